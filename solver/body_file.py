@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bodies by name or file: the built-in ones, files in the same format, and users' SMPL models.
 
-The arrays of a file are taken as they are. Files of unknown origin go through
-``scope_addon/untrusted/body_file.py``, which also reads pickles without running what they name.
+Arrays are checked by ``body_checks``. Files of unknown origin go through
+``scope_addon/untrusted/body_file.py``, which takes no more memory than a file has a right to, and
+also reads pickles without running what they name.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ import numpy as np
 
 from .arrays import described
 from .body import Body
+from .body_checks import OPTIONAL_ARRAYS, REQUIRED_ARRAYS, check_arrays, check_body
 from .errors import InvalidValueError, ModelFileError, ScopeWarning
 from .part import Array
 from .smpl_family import MAX_BETAS, smpl_body, stored_gender
@@ -37,22 +39,6 @@ GROWTH = ASSETS / "body" / "growth.npz"
 # Below, a person is more probably a child than an adult: the mean of girls and boys of eleven, 2.6
 # standard deviations below that of the body's adults.
 CHILD_BELOW_M = 1.45
-# What a file in our own format has; shapes as in `Body`.
-REQUIRED = (
-    "joint_names",
-    "kintree_table",
-    "v_template",
-    "shapedirs",
-    "J_template",
-    "J_shapedirs",
-    "skin_joints",
-    "skin_weights",
-    "faces",
-    "keypoint_names",
-    "keypoint_part",
-    "keypoint_template",
-    "keypoint_shapedirs",
-)
 _SKIN_TOLERANCE = 0.01  # of the sum of a vertex's weights
 CHOICE = f"give one of {', '.join(BUILT_IN)}, or a body's .npz or .pkl file"
 
@@ -196,9 +182,17 @@ def scope_body(data: Mapping[str, Array], path: Path) -> Body:
     """Return the body of a file in our own format.
 
     :param data: its arrays by name: v_template (V, 3), and the others as `Body` has them.
-    :raises ModelFileError: an array is missing.
+    :raises ModelFileError: an array is missing or cannot be used, or they contradict each other.
     """
-    missing = [k for k in REQUIRED if k not in data]
+    check_arrays(data, REQUIRED_ARRAYS | OPTIONAL_ARRAYS, path)
+    body = _unchecked(data, path)
+    check_body(body, path)
+    return body
+
+
+def _unchecked(data: Mapping[str, Array], path: Path) -> Body:
+    """Return the body of a file in our own format, as `scope_body`, whose arrays are right."""
+    missing = [k for k in REQUIRED_ARRAYS if k not in data]
     if missing:
         raise ModelFileError(f"{path} lacks {', '.join(missing)}: it is not a Scope body file")
 
@@ -234,7 +228,7 @@ def _built_in(which: str) -> Body:
     data = _read_once(BUILT_IN[which], "body file")
     if which in CHILDREN:
         data |= _with_growth(data, which)
-    return scope_body(data, BUILT_IN[which])
+    return _unchecked(data, BUILT_IN[which])
 
 
 def _read_once(path: Path, what: str) -> dict[str, Array]:

@@ -37,6 +37,7 @@ from pathlib import Path
 import numpy as np
 
 from .body import Body
+from .body_checks import check_body, check_tables
 from .errors import ModelFileError
 from .names import BLAZEPOSE, BODY_JOINTS, BODY_PARENTS, COCO
 from .part import Array
@@ -385,7 +386,7 @@ def smpl_body(arrays: Mapping[str, Array], path: Path, betas: int = MAX_BETAS) -
     :param betas: the most shape coefficients to keep; the leading ones are kept.
     :return: a ``Body`` named smpl, smplh, smplx, star, or after the file when the tree is none of
         these.
-    :raises ModelFileError: an array is missing, or they contradict each other.
+    :raises ModelFileError: an array is missing, cannot be used, or they contradict each other.
     """
     missing = [key for key in REQUIRED if key not in arrays]
     if missing:
@@ -393,6 +394,7 @@ def smpl_body(arrays: Mapping[str, Array], path: Path, betas: int = MAX_BETAS) -
             f"{path} lacks {', '.join(missing)}: it is not an SMPL, SMPL+H, SMPL-X or STAR body; "
             "choose another file"
         )
+    check_tables(arrays, path)
     parents = _parents(arrays["kintree_table"], path)
     skeleton = recognise_skeleton(parents)
     name = skeleton.name if skeleton else path.stem
@@ -400,13 +402,6 @@ def smpl_body(arrays: Mapping[str, Array], path: Path, betas: int = MAX_BETAS) -
     if name == "smpl" and posedirs[-1:] == (STAR_CORRECTIVES,):
         name = "star"
     v_template = arrays["v_template"].astype(np.float64)
-    vertices_by_joints = (len(v_template), len(parents))
-    if not arrays["weights"].shape == arrays["J_regressor"].shape[::-1] == vertices_by_joints:
-        raise ModelFileError(
-            f"{path}: of {vertices_by_joints[0]} vertices and {vertices_by_joints[1]} joints, "
-            f"weights must have shape {vertices_by_joints} and J_regressor its transpose, but they "
-            f"have {arrays['weights'].shape} and {arrays['J_regressor'].shape}; download it again"
-        )
     shapedirs = _shapedirs(arrays.get("shapedirs"), len(v_template), name, betas)
     regressor = arrays["J_regressor"].astype(np.float64)
     skin_joints, skin_weights = reduce_weights(arrays["weights"], path)
@@ -426,7 +421,9 @@ def smpl_body(arrays: Mapping[str, Array], path: Path, betas: int = MAX_BETAS) -
         license=_license(name, path),
         gender=gender_of(arrays.get("gender"), path),
     )
-    return derive_keypoints(body)
+    body = derive_keypoints(body)
+    check_body(body, path)
+    return body
 
 
 def _parents(kintree: Array, path: Path) -> Array:

@@ -26,10 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
+from ...solver.body_checks import Form, check_arrays, check_finite_array, check_index
 from ...solver.body_file import BUILT_IN
 from ...solver.errors import ModelFileError
 from ..arrays import Float64Array, IndexArray, Uint8Array
-from ..untrusted.body_file import Form, check_arrays, check_finite_array, check_index
 from ..untrusted.files import read_npz
 
 # By the names of Apple's ARKit, which game engines know; left and right are the person's.

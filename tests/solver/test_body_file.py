@@ -95,12 +95,47 @@ def test_a_model_whose_arrays_contradict_each_other_is_refused(tmp_path):
     tables = make_tables("smpl", betas=2)
     for name in ("J_regressor", "weights"):
         np.savez(path, **{**tables, name: tables[name].T})
-        with pytest.raises(ModelFileError, match="J_regressor its transpose"):
+        with pytest.raises(ModelFileError, match=rf"model\.npz: {name} must have shape .* has"):
             load_body(path)
     np.savez(path, **tables)
     for betas in (-1, 1.5):
         with pytest.raises(InvalidValueError, match="betas must be a whole number"):
             load_body(path, betas)
+
+
+def spoiled(array):
+    return np.where(np.arange(array.size).reshape(array.shape) == 0, np.nan, array)
+
+
+def turned(array):
+    """Points (n, 3), or their derivatives (n, 3, P), with z up instead of y."""
+    return np.stack([array[:, 0], -array[:, 2], array[:, 1]], axis=1)
+
+
+LENGTHS = ("v_template", "J_template", "keypoint_template", "shapedirs", "J_shapedirs")
+DAMAGES = {
+    "NaN": (("v_template", "shapedirs", "weights", "J_template"), spoiled, "contains NaN"),
+    "z up": (LENGTHS, turned, r"head lies above the feet along .* turn the model so that y is up"),
+    "a mirror": (LENGTHS, lambda a: -a, "lies .* along .* turn the model"),
+    "centimetres": (LENGTHS, lambda a: 100.0 * a, "v_template measures .* m, .* the metre"),
+    "another shape": (("shapedirs", "J_shapedirs"), lambda a: a[:-1], "shapedirs must have shape"),
+    "no axes": (("v_template", "kintree_table"), lambda _: np.array(1), "must have shape"),
+    "text": (("weights", "skin_weights", "f", "faces"), lambda a: a.astype(str), "must hold"),
+    "outside": (("f", "faces"), lambda a: a + 10**6, "points outside"),
+}
+
+
+@pytest.mark.parametrize(("keys", "change", "message"), DAMAGES.values(), ids=DAMAGES)
+@pytest.mark.parametrize("layout", ["smpl", "own"])
+def test_what_no_body_can_be_is_refused_with_the_files_name(
+    tmp_path, layout, keys, change, message
+):
+    own = BUILT_IN["scope"]
+    tables = make_tables("smpl") if layout == "smpl" else read_arrays(own, "body file")
+    path = tmp_path / "person.npz"
+    np.savez(path, **tables | {key: change(tables[key]) for key in keys if key in tables})
+    with pytest.raises(ModelFileError, match=rf"person\.npz: .*{message}"):
+        load_body(path)
 
 
 def test_a_pickle_is_not_opened_but_the_way_to_read_it_is_told(tmp_path):
