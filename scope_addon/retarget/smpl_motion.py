@@ -31,6 +31,9 @@ MAX_PEOPLE = 100  # of one file
 _LISTED = 8  # names of a table's content in a message
 MAX_FRAME = 10_000_000  # of the footage
 MAX_FRAMES = 500_000  # more than two hours at 60 frames per second
+# Of a file for each frame of each person beyond that: a frame takes 3 kB of memory, and zeros
+# nothing of a compressed file. Moving people take over a hundred.
+_FEWEST_BYTES = 20
 _MAX_BETAS = 400
 # Frames per second.
 SLOWEST = 1e-4
@@ -124,8 +127,8 @@ class SmplMotion:
 def read_smpl_motions(path: Path) -> list[SmplMotion]:
     """Read the SMPL-style motions of a file, one for each person.
 
-    :raises MotionFileError: the file cannot be read, has no poses, or one of its arrays cannot be
-        used.
+    :raises MotionFileError: the file cannot be read, has no poses, one of its arrays cannot be
+        used, or its people need far more memory than the file explains.
     """
     tables = read_tables(path, MotionFileError, "motion file", _READ)
     found = list(_motion_tables(tables, ()))
@@ -136,7 +139,16 @@ def read_smpl_motions(path: Path) -> list[SmplMotion]:
         )
     rank = min(_rank(names) for names, _ in found)
     best = [arrays for names, arrays in found if _rank(names) == rank]
-    return [smpl_motion(arrays, path) for arrays in best[:MAX_PEOPLE]]
+    motions: list[SmplMotion] = []
+    most_frames = MAX_FRAMES + path.stat().st_size // _FEWEST_BYTES
+    for arrays in best[:MAX_PEOPLE]:
+        motions.append(smpl_motion(arrays, path))
+        if sum(map(len, motions)) > most_frames:
+            raise MotionFileError(
+                f"{path}: its {len(best)} people have more than {most_frames} frames together, but "
+                "hardly any movement; cut it, or leave out people"
+            )
+    return motions
 
 
 def _motion_tables(

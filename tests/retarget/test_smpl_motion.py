@@ -211,6 +211,17 @@ def test_broken_arrays_are_an_error_in_one_sentence(name):
     assert "\n" not in str(caught.value)
 
 
+def test_many_people_who_do_not_move_are_refused_and_those_who_do_are_not(tmp_path, monkeypatch):
+    """Each is short enough, but all of them would take gigabytes of memory."""
+    monkeypatch.setattr("scope.scope_addon.retarget.smpl_motion.MAX_FRAMES", 100)
+    moving = np.random.default_rng(1).uniform(-1.0, 1.0, (100, 72)).astype(np.float32)
+    for name, poses in (("moving.npz", moving), ("still.npz", np.zeros((100, 72), np.uint8))):
+        np.savez_compressed(tmp_path / name, **{f"{k}/poses": poses for k in range(10)})
+    assert len(read_smpl_motions(tmp_path / "moving.npz")) == 10
+    with pytest.raises(MotionFileError, match=r"10 people .* frames together, but hardly any"):
+        read_smpl_motions(tmp_path / "still.npz")
+
+
 def test_pickled_objects_are_no_poses(tmp_path):
     np.savez(tmp_path / "walk.npz", poses=np.array([{}], object))
     with pytest.raises(MotionFileError, match="holds no SMPL-style motion.*it holds poses"):
