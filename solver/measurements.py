@@ -33,9 +33,11 @@ from .validation import (
     warn_of_deviations,
     warn_of_distance,
     warn_of_floor,
+    warn_of_one_confidence,
     warn_of_percentages,
     warn_of_pixels,
     warn_of_points,
+    warn_of_repeated,
 )
 
 # No length, coordinate or confidence is as large. What the solver multiplies of smaller ones stays
@@ -218,7 +220,10 @@ class Measurements:
         out = np.empty((n, 3))
         _normalize(K, pixels, confidence, out)
         warn_of_pixels(K, pixels, out)
-        if m.sigma_px is not None:
+        warn_of_repeated(indices, out, "2D keypoints")
+        if m.sigma_px is None:
+            warn_of_one_confidence(m.confidence, out, "Confidence of 2D keypoints", "sigma_px")
+        else:
             sigma_px = _sigmas(m.sigma_px, n, "sigma_px of 2D keypoints")
             least = _LEAST_SIGMA_2D * K[0, 0]
             most = _MOST_SIGMA_2D * K[0, 0]
@@ -244,7 +249,10 @@ class Measurements:
         warn_of_points(
             out, has_camera=self.intrinsics is not None, are_weights=m.sigma_m is not None
         )
-        if m.sigma_m is not None:
+        warn_of_repeated(indices, out, "3D keypoints")
+        if m.sigma_m is None:
+            warn_of_one_confidence(m.confidence, out, "Confidence of 3D keypoints", "sigma_m")
+        else:
             sigma_m = _sigmas(m.sigma_m, len(indices), "sigma_m of 3D keypoints")
             warn_of_deviations(sigma_m, 0.0, 1.0, "sigma_m of 3D keypoints", "metres")
             out[:, 3] *= (SIGMA_3D / sigma_m) ** 2

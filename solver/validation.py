@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import as_array, as_integers, described
+from .arrays import as_array, as_integers, described, has_axis
 from .errors import InvalidValueError, ScopeWarning, ShapeError, UnitsWarning
 from .kernel import kernel
 from .part import Array
@@ -33,6 +33,9 @@ _NO_WEIGHTS = np.zeros(0)
 _UNITS = "Scope's unit is the metre; divide millimetres by 1000"
 _FEWEST_POINTS = 4  # that are no coincidence
 _WIDEST = 4.0  # tangent of half a pinhole camera's field of view, 76 degrees
+_LEAST_CONFIDENT = 0.2  # if there is one for all: metres are smaller, of pixels more than 1
+# Of the extent of all keypoints: a person's head is a sixth, what two detectors disagree by less.
+_FAR_APART = 0.15
 _MOST_CONFIDENT = 10.0  # on average: confidences are shares of one, or a few times that
 # Coordinates of a normalized image are in 0..1 or -1..1, of points beside it a bit larger.
 _NORMALIZED = 2.0
@@ -313,6 +316,37 @@ def _warn(kind: type[ScopeWarning], message: str) -> None:
     warnings.warn(message, kind, stacklevel=4)
 
 
+def warn_of_repeated(indices: Array, rows: Array, name: str) -> None:
+    """Warn of keypoints of which one point lies at two places.
+
+    :param rows: (n, 3 or 4) of where each is, and its confidence.
+    """
+    k = _first_elsewhere(indices, rows)
+    if k >= 0:
+        _warn(
+            ScopeWarning,
+            f"{name} have point {indices[k]} twice, at places that are far apart; give each point "
+            "its own name or number (joint i is M + i).",
+        )
+
+
+def warn_of_one_confidence(given: ArrayLike, rows: Array, name: str, sigma: str) -> None:
+    """Warn of one confidence for all that is probably meant as their standard deviation.
+
+    :param rows: (n, 3 or 4), of which the last column are the confidences.
+    :param sigma: the field of deviations.
+    """
+    if has_axis(given) or not len(rows):
+        return
+    value = rows[0, -1]
+    if 0.0 < value < _LEAST_CONFIDENT or value > 1.0:
+        _warn(
+            ScopeWarning,
+            f"{name} is {value:g} for all of them, which makes all their weights {value:g} times "
+            f"what they are without; if it is a standard deviation, give it as {sigma}.",
+        )
+
+
 def warn_of_distance(points: Array, name: str) -> None:
     """Warn of points (n, 3) that are too far away to be in metres, with `UnitsWarning`.
 
@@ -578,3 +612,36 @@ def _far_apart(points: Array, most: float) -> bool:
                 far += 1
         before = k
     return 2 * far > steps
+
+
+@kernel
+def _first_elsewhere(indices: Array, rows: Array) -> int:
+    """Return the number of the first row that has the point of a row before it, far away from
+    there, or -1.
+
+    :param rows: (n, C) coordinates and confidence; rows without a positive confidence do not count.
+    """
+    n, last = rows.shape[0], rows.shape[1] - 1
+    is_rising = True
+    for k in range(1, n):
+        is_rising = is_rising and indices[k] > indices[k - 1]
+    if is_rising:  # then none is repeated
+        return -1
+    extent = 0.0
+    for c in range(last):
+        least = np.inf
+        most = -np.inf
+        for k in range(n):
+            if rows[k, last] > 0.0 and abs(rows[k, c]) < np.inf:
+                least = min(least, rows[k, c])
+                most = max(most, rows[k, c])
+        extent = max(extent, most - least)
+    for k in range(1, n):
+        for j in range(k):
+            if indices[j] == indices[k] and rows[j, last] > 0.0 and rows[k, last] > 0.0:
+                square = 0.0
+                for c in range(last):
+                    square += (rows[k, c] - rows[j, c]) ** 2
+                if square > (_FAR_APART * extent) ** 2:
+                    return k
+    return -1

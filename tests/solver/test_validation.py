@@ -21,6 +21,7 @@ from scope.solver import (
     Options,
     PosePriors,
     Priors,
+    ScopeWarning,
     ShapeError,
     Stage,
     State,
@@ -38,7 +39,7 @@ from scope.solver import (
 )
 
 from .small_problem import BODY, KEYPOINTS, POINTS, SEEN, K, M, P
-from .synthetic import INTRINSICS
+from .synthetic import INTRINSICS, project
 
 UPRIGHT = np.eye(3)
 SHORT = Options(stages=[Stage(max_iterations=2)])
@@ -327,7 +328,40 @@ def test_lengths_in_millimetres_bring_a_warning_and_a_fit():
         make_tree(body(l=1000.0 * BODY.l))
 
 
+def seen_3d(points=POINTS, indices=np.arange(M), **more):  # noqa: B008
+    return seen(keypoints3d=Keypoints3D(indices, points, **more))
+
+
+TWICE = np.array([1, *range(1, M)])
+PROBABLE_MISTAKES = {
+    "metres as a confidence": (seen_3d(confidence=0.02), "give it as sigma_m"),
+    "pixels as a confidence": (
+        seen(intrinsics=INTRINSICS, keypoints2d=Keypoints2D(range(M), project(POINTS), 4.0)),
+        "give it as sigma_px",
+    ),
+    "a point twice in space": (seen_3d(indices=TWICE), "3D keypoints have point 1 twice"),
+    "a point twice in the image": (
+        seen(intrinsics=INTRINSICS, keypoints2d=Keypoints2D(TWICE, project(POINTS))),
+        "2D keypoints have point 1 twice",
+    ),
+}
+
+
+@pytest.mark.parametrize(("make", "message"), PROBABLE_MISTAKES.values(), ids=PROBABLE_MISTAKES)
+def test_what_is_probably_a_mistake_brings_a_warning(make, message):
+    with pytest.warns(ScopeWarning, match=message):
+        make()
+
+
 NOT_REFUSED = {
+    "half the confidence": seen_3d(confidence=0.5),
+    "one confidence beside a deviation": seen_3d(confidence=2.0, sigma_m=0.02),
+    "a point measured twice": seen_3d(
+        np.concatenate([POINTS, POINTS[::-1] + 0.03]), [*range(M), *range(M - 1, -1, -1)]
+    ),
+    "a point twice, once without confidence": seen_3d(
+        indices=TWICE, confidence=[0.0] + [1.0] * (M - 1)
+    ),
     "far away": seen(keypoints3d=replace(KEYPOINTS, points=POINTS + [0.0, 0.0, 2000.0])),
     "one stray point": seen(
         keypoints3d=replace(KEYPOINTS, points=np.vstack([POINTS[:-1], [[0, 0, 9000.0]]]))
