@@ -178,8 +178,50 @@ def test_what_is_no_lock_of_ours_removes_nothing(tmp_path, kind):
     (folder / f".walk.{NAME}.npz").write_text("a user's")
     before = set(os.listdir(folder))
     remove_abandoned(folder)
+    assert not hold(lock)
+    assert not is_abandoned(lock)
     assert set(os.listdir(folder)) == before
     assert os.listdir(elsewhere) == ["empty"]
+    assert not (tmp_path / "none").exists()
+
+
+@posix
+@pytest.mark.parametrize("when", ["before it is opened", "while it is held"])
+@pytest.mark.parametrize("kind", ["link", "pipe", "folder"])
+def test_a_lock_that_somebody_replaces_is_neither_followed_nor_waited_for(
+    tmp_path, monkeypatch, kind, when
+):
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.touch()
+    lock = tmp_path / "lock"
+
+    def replace_it():
+        lock.unlink()
+        if kind == "link":
+            lock.symlink_to(elsewhere)
+        elif kind == "pipe":
+            os.mkfifo(lock)
+        else:
+            lock.mkdir()
+
+    really_open = os.open
+
+    def open_late(path, flags, *rest):
+        if Path(path) == lock and not flags & os.O_CREAT:
+            replace_it()
+        return really_open(path, flags, *rest)
+
+    if when == "while it is held":
+        assert hold(lock)
+        replace_it()
+    else:
+        monkeypatch.setattr(os, "open", open_late)
+        assert not hold(lock)
+        monkeypatch.undo()
+    assert not hold(lock)
+    assert not is_abandoned(lock)
+    release(lock)
+    assert elsewhere.exists()
 
 
 @posix
