@@ -121,8 +121,8 @@ def _capture(
             file = values["record"].with_suffix(SUFFIX)
             if is_held(lock_of(file)):
                 raise UsageError(
-                    f"another live capture records to {values['record']}; give another name with "
-                    "--record"
+                    f"another live capture records to {values['record']}, as {lock_of(file)} says; "
+                    "give another name with --record, or remove that file if none runs"
                 )
             if is_unfinished(file):
                 print_message(f"{file} has a recording that is not finished: scope live {file}")

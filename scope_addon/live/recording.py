@@ -475,8 +475,12 @@ def unfinished_recording(
     :raises NoPersonError: there is no whole pose.
     :raises UsageError: it still grows, or its body has changed.
     """
-    if is_held(lock_of(journal)):
-        raise UsageError(f"{journal} is still being recorded; end that live capture first")
+    lock = lock_of(journal)
+    if is_held(lock):
+        raise UsageError(
+            f"{journal} is still being recorded, as {lock} says; end that live capture first, or "
+            "remove that file if none runs"
+        )
     about = read_about(journal)
     body = load_body(about.body)
     records = read_records(journal, about, body)

@@ -196,7 +196,9 @@ def test_what_still_grows_is_not_finished(tmp_path, body, capfd):
     recording, (path,) = recorded(tmp_path / "a", body)
     growing = recording._journal.path
     assert main(["live", str(growing), "--record", str(tmp_path / "early.npz")]) == 2
-    assert f"{growing} is still being recorded; end that live" in capfd.readouterr().err
+    lock = growing.with_name(f".{growing.name}.lock")
+    said = f"{growing} is still being recorded, as {lock} says; end that live"
+    assert said in capfd.readouterr().err
     assert growing.is_file()
     assert recording.save() == [path]
 
@@ -207,8 +209,17 @@ def test_a_second_capture_of_the_same_name_is_refused(tmp_path, body, monkeypatc
     fake_run(monkeypatch, lambda: None)
     name = str(recording._journal.path.with_suffix(".npz"))
     assert main(["live", str(SAMPLE), "--record", name]) == 2
-    assert f"another live capture records to {name}" in capfd.readouterr().err
+    assert f"another live capture records to {name}, as {tmp_path}" in capfd.readouterr().err
     assert recording.save() == [path]
+
+
+def test_what_hinders_a_recording_though_nothing_is_recorded_is_named(tmp_path, capfd):
+    """Such as a lock that another program has written into, which could not be found otherwise."""
+    (tmp_path / ".take.recording.lock").write_text("another's")
+    assert main(["live", str(SAMPLE), "--record", str(tmp_path / "take.npz")]) == 2
+    said = f"as {tmp_path}/.take.recording.lock says; give another name with --record, or remove"
+    assert said in capfd.readouterr().err
+    assert (tmp_path / ".take.recording.lock").read_text("utf-8") == "another's"
 
 
 def test_of_two_recordings_that_begin_at_once_neither_replaces_the_other(tmp_path, body):
