@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -275,8 +275,17 @@ def retime_strip(strip: bpy.types.NlaStrip, retiming: Retiming) -> None:
     """Move an NLA strip, with the part of its action that it plays; the action's keys are not
     moved.
     """
-    ends = strip.frame_start, strip.frame_end, strip.action_frame_start, strip.action_frame_end
-    start, end, first, last = (retiming.frame(frame) for frame in ends)
+    set_strip_ends(strip, [retiming.frame(frame) for frame in strip_ends(strip)])
+
+
+def strip_ends(strip: bpy.types.NlaStrip) -> list[float]:
+    """Return the first and the last frame of an NLA strip, and of what it plays of its action."""
+    return [strip.frame_start, strip.frame_end, strip.action_frame_start, strip.action_frame_end]
+
+
+def set_strip_ends(strip: bpy.types.NlaStrip, ends: Sequence[float]) -> None:
+    """Set what `strip_ends` returns."""
+    start, end, first, last = ends
     # Blender keeps the end after the start
     strip.action_frame_end = max(last, strip.action_frame_start + 1.0)
     strip.action_frame_start = first

@@ -27,6 +27,7 @@ from .actions import (
     write_whole_keys,
 )
 from .datablocks import NewDatablocks, enter_object_mode
+from .timing import action_strips, set_strip_ends, strip_ends
 
 _SCENE = ("frame_start", "frame_end", "frame_preview_start", "frame_preview_end", "camera")
 RENDER = ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y")
@@ -46,7 +47,10 @@ _Curves = dict[tuple[str, int], bpy.types.FCurve]
 
 @contextmanager
 def all_or_nothing(
-    scene: bpy.types.Scene, *objects: bpy.types.Object, keys: Sequence[bpy.types.Key] = ()
+    scene: bpy.types.Scene,
+    *objects: bpy.types.Object,
+    keys: Sequence[bpy.types.Key] = (),
+    actions: Sequence[bpy.types.Action] = (),
 ) -> Iterator[None]:
     """Roll back new datablocks, scene settings and changes of ``objects`` when the block raises;
     re-raise.
@@ -54,9 +58,13 @@ def all_or_nothing(
     :param objects: the block may change their keys, action, parent, transform and custom
         properties, and the custom properties of their bones.
     :param keys: shape keys whose keyframes, action and values it may change.
+    :param actions: further ones whose content it may change, whatever uses them.
     """
     unique = list(dict.fromkeys(objects))
-    animated = [_SavedAnimation(owner) for owner in (*unique, *keys)]
+    animated = [
+        *(_SavedAnimation(owner) for owner in (*unique, *keys)),
+        *map(_SavedAction, actions),
+    ]
     values = [(block, block.value) for key in keys for block in key.key_blocks]
     new = NewDatablocks()
     settings = _SavedScene(scene)
@@ -89,7 +97,7 @@ class _SavedScene:
         self._current = scene.frame_current, scene.frame_subframe
         self._active = self.layer.objects.active
         self._mode = self._active.mode if self._active else "OBJECT"
-        self._markers = set(scene.timeline_markers.values())
+        self._markers = {m: (m.name, m.frame) for m in scene.timeline_markers}
         self._selected = [
             obj for obj in self.layer.objects if obj.select_get(view_layer=self.layer)
         ]
@@ -99,6 +107,9 @@ class _SavedScene:
         scene = self._scene
         for marker in [m for m in scene.timeline_markers if m not in self._markers]:
             scene.timeline_markers.remove(marker)
+        for marker, (name, frame) in self._markers.items():
+            marker.name = name
+            marker.frame = frame
         for name, value in self._render.items():
             setattr(scene.render, name, value)
         scene.frame_end = max(self._settings["frame_end"], scene.frame_start)
@@ -139,10 +150,32 @@ class _SavedTransform:
         obj.update_tag()
 
 
+class _SavedAction:
+    """A copy of the content of an action in case the block changes it."""
+
+    def __init__(self, action: bpy.types.Action) -> None:
+        self._action = action
+        self._fake_user = action.use_fake_user
+        self._copy = action.copy()
+        self._properties = _restorable(action)
+        for name in self._properties:  # or the block could take the copy for another action of ours
+            del self._copy[name]
+
+    def restore(self) -> None:
+        """Restore the content, for every object that it animates, and remove the copy."""
+        restore_content(self._action, self._copy)
+        for name, value in self._properties.items():
+            self._action[name] = value
+        self._action.use_fake_user = self._fake_user
+        self.discard_copy()
+
+    def discard_copy(self) -> None:
+        """Remove the copy."""
+        bpy.data.actions.remove(self._copy)
+
+
 class _SavedAnimation:
-    """The action assigned to an object or shape keys, and a copy of its content in case the block
-    changes it.
-    """
+    """The action assigned to an object or shape keys, with its content; the ends of its strips."""
 
     def __init__(self, obj: bpy.types.Object | bpy.types.Key) -> None:
         self._obj = obj
@@ -150,8 +183,8 @@ class _SavedAnimation:
         self._had_data = data is not None
         self._action: bpy.types.Action | None = data.action if data else None
         self._slot = used_slot(data)
-        self._fake_user = self._action.use_fake_user if self._action else False
-        self._copy = self._action.copy() if self._action else None
+        self._content = _SavedAction(self._action) if self._action else None
+        self._strips = [(s, strip_ends(s)) for s in action_strips(data)] if data else []
 
     def restore(self) -> None:
         """Restore the action as it was, for every object that it animates."""
@@ -159,20 +192,18 @@ class _SavedAnimation:
             self._obj.animation_data_clear()
             return
         data = self._obj.animation_data
-        action = self._action
-        copy = self._copy
-        if action is None or copy is None:
+        for strip, ends in self._strips:
+            set_strip_ends(strip, ends)
+        if self._action is None or self._content is None:
             data.action = None
             return
-        restore_content(action, copy)
-        bpy.data.actions.remove(copy)
-        assign_action(data, action, self._slot)
-        action.use_fake_user = self._fake_user
+        self._content.restore()
+        assign_action(data, self._action, self._slot)
 
     def discard_copy(self) -> None:
         """Remove the copy after success."""
-        if self._copy is not None:
-            bpy.data.actions.remove(self._copy)
+        if self._content is not None:
+            self._content.discard_copy()
 
 
 def _restorable(owner: bpy.types.bpy_struct) -> dict[str, bool | int | float | str | bpy.types.ID]:

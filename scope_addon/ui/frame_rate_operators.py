@@ -99,6 +99,7 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         """Change the rate and move the captures in time."""
         from ..scene.animated import other_animation
         from ..scene.character.keys import bake_whole_frames, read_clip
+        from ..scene.character.root_object import root_object
         from ..scene.match_rate import change_rate
         from ..scene.timing import keyed_rate, scene_rate
         from ..scene.transaction import all_or_nothing
@@ -116,7 +117,15 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         sources = {obj: retargeted_from(scene, obj) for obj in scene.objects}
         rigs = [(obj, person) for obj, person in sources.items() if person in people]
         cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
-        with all_or_nothing(scene, *people, *(rig for rig, _ in rigs), *cameras):
+        roots = [root for obj in sources if (root := root_object(obj)) is not None]
+        keys = {
+            keys
+            for obj in scene.objects
+            if (keys := getattr(obj.data, "shape_keys", None)) and keys.library is None
+        }
+        actions = [action for action in bpy.data.actions if action.library is None]
+        moved = [*people, *(rig for rig, _ in rigs), *cameras, *roots]
+        with all_or_nothing(scene, *moved, keys=list(keys), actions=actions):
             warnings = change_rate(scene, rate, motions, rigs)
             for person, body in bodies.items():
                 bake_whole_frames(person, body, rate)

@@ -250,6 +250,53 @@ def test_every_take_of_a_rig_moves_along_in_the_nla_too(scene):
     np.testing.assert_allclose(at_times(rig, list(bones.values()), 101.0), take_2, atol=1e-3)
 
 
+def test_a_failure_leaves_everything_at_its_frames(scene, monkeypatch):
+    """An earlier take in the NLA, one that nothing uses, a face, a trajectory and a marker."""
+    person = built()
+    scene.scope_retarget.root = "object"
+    rig, _ = retargeted(person)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.scope.push_to_nla()
+    bpy.context.view_layer.objects.active = person
+    bpy.ops.scope.retarget()
+    unused = rig.animation_data.action.copy()
+    unused.use_fake_user = True
+    face = scene["cube"]
+    for name in ("Basis", "jawOpen"):
+        face.shape_key_add(name=name)
+    captured = CapturedExpressions(START + np.arange(41.0), np.ones((41, len(EXPRESSIONS))))
+    chosen = ExpressionMap({"jawOpen": {"jawOpen": 1.0}})
+    retarget_expressions(captured, [face], chosen, person.name)
+    push_to_nla(face.data.shape_keys)
+    scene.timeline_markers.new("check 12-20", frame=12)
+
+    def all_frames():
+        animations = [rig.animation_data, face.data.shape_keys.animation_data]
+        strips = [each.nla_tracks[0].strips[0] for each in animations]
+        return (
+            {
+                action.name: ([read_keys(c).tolist() for c in fcurves_of(action)], dict(action))
+                for action in bpy.data.actions
+            },
+            [(s.frame_start, s.frame_end, s.action_frame_end) for s in strips],
+            [(marker.name, marker.frame) for marker in scene.timeline_markers],
+            [obj.get("scope_rate") for obj in scene.objects],
+        )
+
+    def fail(*arguments):
+        raise MemoryError
+
+    before = all_frames()
+    monkeypatch.setattr("scope.scope_addon.scene.match_rate._show_footage", fail)
+    with pytest.raises((MemoryError, RuntimeError)):
+        bpy.ops.scope.match_frame_rate()
+    assert all_frames() == before
+    assert scene.render.fps == 20
+    monkeypatch.undo()
+    bpy.ops.scope.match_frame_rate()
+    assert all(now != then for now, then in zip(all_frames()[:3], before[:3], strict=True))
+
+
 def test_a_strip_that_plays_the_action_of_a_library_stays_with_its_keys(scene, tmp_path):
     person = built()
     rig, _ = retargeted(person)
