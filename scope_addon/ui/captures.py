@@ -44,8 +44,11 @@ def shown_capture(scene: bpy.types.Scene) -> bpy.types.Collection | None:
     return found[-1] if found else None
 
 
-def hide_others(scene: bpy.types.Scene, shown: Collection[bpy.types.Collection]) -> None:
-    """Hide all captures but the new ones, in whose place they are, in viewports and renders.
+def hide_others(
+    scene: bpy.types.Scene, shown: Collection[bpy.types.Collection]
+) -> list[bpy.types.Collection]:
+    """Hide all captures but the new ones, in whose place they are, in viewports and renders; return
+    those that were shown.
 
     Whoever selects one in the list shows it again. One that another scene has too stays shown, as
     it would be hidden there as well.
@@ -56,11 +59,14 @@ def hide_others(scene: bpy.types.Scene, shown: Collection[bpy.types.Collection])
         if other != scene
         for each in other.collection.children_recursive
     }
+    hidden = []
     for capture in captures_of(scene):
         is_local = capture.library is None and not capture.hide_viewport
         if capture not in shown and capture not in elsewhere and is_local:
             capture.hide_viewport = capture.hide_render = True
             capture[_HIDDEN] = True
+            hidden.append(capture)
+    return hidden
 
 
 def show_again(capture: bpy.types.Collection) -> None:

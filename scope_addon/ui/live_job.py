@@ -46,6 +46,7 @@ from .capture_job import (
     chosen_values,
     selection_kept,
 )
+from .captures import hide_others, show_again
 from .live_properties import with_login
 from .preferences import cache, python_command
 from .retarget_maps import listed_map
@@ -105,8 +106,9 @@ class LiveJob:
         self._rig = live_rig(scene, self._scene_body) if follows else None
         self._result: dict[str, Any] | None = None  # the recording's message
         self._last_pose_s = self._notice_s = self._stopped_s = self._result_s = time.monotonic()
-        # whether the last step, or one before, created the body
-        self.created = self._was_created = False
+        # whether the last step, or one before, created the body; whether that selected it
+        self.created = self._was_created = self.selects_body = False
+        self._hidden: set[int] = set()  # session_uid of the captures in whose place the bodies are
         self._cache = cache()
         try:
             self.worker = LiveProcess(
@@ -181,6 +183,7 @@ class LiveJob:
         self.cancelled = True
         self.close()
         self._remove_bodies()
+        self._show_captures()
         if self._rig is not None:
             self._rig.restore()
         self._before.restore()
@@ -261,15 +264,27 @@ class LiveJob:
 
     def _show_person(self, scene: bpy.types.Scene, pose: ShownPose) -> None:
         body = self._bodies[pose.person]
-        created = body.show(pose.rotations, pose.pelvis, pose.betas)
+        is_busy = body.armature is None and Selection(scene).shows_work(since=self._selection)
+        with selection_kept(scene) if is_busy else nullcontext():
+            created = body.show(pose.rotations, pose.pelvis, pose.betas)
         if created and not self._was_created:
             self.created = self._was_created = True
-            select_only(bpy.context.view_layer, body.armature)
-            self._selection = Selection(scene)
+            self.selects_body = not is_busy
+            if self.selects_body:
+                select_only(bpy.context.view_layer, body.armature)
+                self._selection = Selection(scene)
+        if created:
+            self._hidden |= {capture.session_uid for capture in hide_others(scene, [])}
         if self._rig is not None and pose.person == 0:
             if created and scene.scope_retarget.captured == "hide":
                 hide(body.armature, bpy.context.view_layer)
             self._rig.show(pose.rotations, pose.pelvis, body.betas)
+
+    def _show_captures(self) -> None:
+        """Show the captures again that were hidden while the bodies were in their place."""
+        for capture in bpy.data.collections:
+            if capture.session_uid in self._hidden:
+                show_again(capture)
 
     def _remove_bodies(self) -> None:
         for body in self._bodies:
@@ -277,6 +292,7 @@ class LiveJob:
 
     def _leave_pose(self, scene: bpy.types.Scene) -> None:
         """Leave the last pose, on an armature at rest in the shape that was estimated last."""
+        self._show_captures()
         with window_shows(scene):
             for body in self._bodies:
                 body.rest_at_shape()

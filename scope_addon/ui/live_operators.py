@@ -101,7 +101,8 @@ class _LiveOperator(JobOperator):
             return {"FINISHED"}
         if job.created:
             hide_startup_cube(context)
-            frame_selected(context)
+            if job.selects_body:
+                frame_selected(context)
         if job.poses != before:
             redraw_viewports()
         if job.recording and not job.finishing and not self._played:

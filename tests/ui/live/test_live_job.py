@@ -16,9 +16,11 @@ from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import OfflineError, UsageError, VideoError
 from scope.scope_addon.job.live_process import LiveProcess
 from scope.scope_addon.job.process import WorkerFailedError
+from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.ui import live_job
 from scope.scope_addon.ui.live_job import LiveJob, live_request
 from scope.scope_addon.ui.preferences import cache
+from scope.solver.body_file import load_body
 
 from ...job.processes import runs, wait_for
 from ...scene.made_rigs import build_rig
@@ -314,6 +316,39 @@ def test_what_was_selected_during_a_live_capture_stays_selected(live):
     assert [obj.name for obj in bpy.context.selected_objects] == ["Empty"]
     assert "scope_motion" in bpy.context.scene.scope.capture.objects[0]
     assert bpy.context.view_layer.objects.active.name == "Empty"
+
+
+def test_a_mesh_that_is_being_edited_stays_so(live):
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.ops.object.mode_set(mode="EDIT")
+    job = live('pose(1); assert receive() == "record"; pose(2); finish()')
+    until(job, lambda: job.has_body)
+    edited = bpy.context.view_layer.objects.active
+    assert (edited.type, edited.mode) == ("MESH", "EDIT")
+    job.record()
+    to_end(job)
+    assert bpy.context.scene.scope.capture is not None
+    assert (bpy.context.view_layer.objects.active, edited.mode) == (edited, "EDIT")
+    assert [obj.name for obj in bpy.context.selected_objects] == [edited.name]
+
+
+@pytest.mark.parametrize(("end", "is_shown"), [("stop", True), ("cancel", True), ("record", False)])
+def test_an_earlier_capture_is_hidden_while_a_body_follows_in_its_place(
+    live, standing, end, is_shown
+):
+    result = build_scene([standing], load_body(standing.body_model), None, BuildOptions())
+    earlier = result.collection
+    job = live("pose(1); receive(); pose(2); finish()")
+    until(job, lambda: job.has_body)
+    assert (earlier.hide_viewport, earlier.hide_render) == (True, True)
+    if end == "record":
+        job.record()
+    else:
+        getattr(job, end)()
+    if end != "cancel":
+        to_end(job)
+    assert (earlier.hide_viewport, earlier.hide_render) == (not is_shown, not is_shown)
+    assert ("scope_hidden" in earlier) != is_shown
 
 
 def test_a_recording_that_was_asked_for_too_late_leaves_the_last_pose(live):
