@@ -75,13 +75,50 @@ def test_the_same_scene_in_another_light_after_a_gap_is_not_a_cut(factors: np.nd
         [scene(0)] * 10 + [scene(1)] + [scene(0)] * 10,
         [scene(0)] * 10 + [np.zeros((H, W, 3), np.uint8)] * 10 + [scene(0)] * 10,
         [scene(0, 4000)[:, 60 * k : 60 * k + W] for k in range(40)],
-        [cv2.addWeighted(scene(0), 1 - k / 20, scene(1), k / 20, 0) for k in range(21)],
+        [brightened(scene(0), 0.2 + k / 60) for k in range(60)],
         [np.clip(scene(0) * (k / 20), 0, 255).astype(np.uint8) for k in range(30)],
     ],
-    ids=["a flash", "a frame of something else", "a gap", "a fast pan", "a dissolve", "a fade"],
+    ids=["a flash", "a frame of something else", "a gap", "a fast pan", "a slow light", "a fade"],
 )
 def test_other_changes_are_not_cuts(frames: list[np.ndarray]) -> None:
     assert cuts(frames) == []
+
+
+@pytest.mark.parametrize("frames", [6, 12, 24])
+@pytest.mark.parametrize("through", [None, 0, 255])
+def test_a_dissolve_and_a_fade_are_a_cut(frames: int, through: int | None) -> None:
+    """It is where the new scene is seen better than the old one; a quick fade may have two."""
+    colour = None if through is None else np.full((H, W, 3), through, np.uint8)
+    middle = [mixed(scene(0), scene(1), (k + 1) / (frames + 1), colour) for k in range(frames)]
+    found = cuts([*[scene(0)] * 40, *middle, *[scene(1)] * 40])
+    assert 40 + frames / 2 - 1 <= found[-1] <= 40 + frames + 5
+    assert len(found) == 1 or (frames == 6 and through is not None and found[0] >= 40)
+
+
+def test_a_dissolve_between_real_clips_is_a_cut(
+    frames: Callable[..., Iterator[np.ndarray]],
+) -> None:
+    """People move in both, one of whom comes near."""
+    one, other = (
+        [cv2.resize(each, (W, H)) for each in frames(f"clips/{name}", stop=52)]
+        for name in ("gesture_square", "sit_stand_close")
+    )
+    for colour in (None, np.zeros((H, W, 3), np.uint8)):
+        middle = [mixed(one[40 + k], other[k], (k + 1) / 13, colour) for k in range(12)]
+        (cut,) = cuts([*one[:40], *middle, *other[12:]])
+        assert 45 <= cut <= 57
+    assert cuts(one) == cuts(other) == []
+
+
+def mixed(
+    before: np.ndarray, after: np.ndarray, share: float, colour: np.ndarray | None
+) -> np.ndarray:
+    """A frame of a dissolve, or of a fade through a colour."""
+    if colour is None:
+        return cv2.addWeighted(before, 1 - share, after, share, 0)
+    if share < 0.5:
+        return cv2.addWeighted(before, 1 - 2 * share, colour, 2 * share, 0)
+    return cv2.addWeighted(colour, 2 - 2 * share, after, 2 * share - 1, 0)
 
 
 @pytest.mark.slow
