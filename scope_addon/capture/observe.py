@@ -271,7 +271,7 @@ def _footage(job: ObservationJob, path: GivenPath | None, observed: Observed) ->
     if path is not None:
         given = path.at(times_s)
         motion = CameraMotion.given(given)
-        warnings += _doubts_about_path(job, motion, seen)
+        warnings += _doubts_about_path(job, motion, seen, observed.scene_starts)
     return Footage(
         timestamps=times_s,
         camera=camera,
@@ -286,12 +286,20 @@ def _footage(job: ObservationJob, path: GivenPath | None, observed: Observed) ->
 
 
 def _doubts_about_path(
-    job: ObservationJob, given: CameraMotion, seen: CameraMotion
+    job: ObservationJob, given: CameraMotion, seen: CameraMotion, scene_starts: NDArray[np.int64]
 ) -> list[Notice]:
-    """Return a warning if the given camera turns otherwise than the background shows."""
+    """Return a warning if the given camera turns otherwise than the background shows within the
+    scenes: how the camera of one scene is turned to that of another, the background does not show.
+
+    :param scene_starts: (M,) rows of the frames that begin another scene.
+    """
     if not seen.known.any() or job.options.camera_path is None:
         return []
-    turns = np.swapaxes(given.R_first_camera, 1, 2) @ seen.R_first_camera
+    R_seen = seen.R_first_camera.copy()
+    for rows in np.split(np.arange(len(R_seen)), scene_starts):
+        first = rows[seen.known[rows].argmax()]
+        R_seen[rows] = given.R_first_camera[first] @ R_seen[first].T @ R_seen[rows]
+    turns = np.swapaxes(given.R_first_camera, 1, 2) @ R_seen
     off_deg = float(np.degrees(np.median(np.linalg.norm(log(turns[seen.known]), axis=-1))))
     if off_deg < PATH_OFF_DEG + PATH_OFF_SHARE * seen.largest_turn_deg:
         return []

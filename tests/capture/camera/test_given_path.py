@@ -102,14 +102,17 @@ def test_a_gap_in_the_captured_part_is_refused(tmp_path):
         path.at(np.array([0.1, 0.8]))
 
 
+@pytest.mark.parametrize("cut_deg", [0.0, 90.0])
 @pytest.mark.parametrize(("begins_s", "codes"), [(0.0, []), (1.0, ["path_contradicts"])])
-def test_a_path_of_another_clip_or_time_is_warned_of(begins_s, codes):
-    """The camera turns by 30 degrees, and the background by up to 3 degrees more."""
+def test_a_path_of_another_clip_or_time_is_warned_of(begins_s, codes, cut_deg):
+    """The camera turns by 30 degrees, and the background by up to 3 degrees more; and at a cut,
+    which hides from the background by how much.
+    """
     times_s = np.arange(20) / 10.0
     turn = np.radians(15.0) * times_s**2 / 2.0
     axis = np.array([0.0, 1.0, 0.0])
     poses = np.tile(np.eye(4), (20, 1, 1))
-    poses[:, :3, :3] = exp(turn[:, None] * axis)
+    poses[:, :3, :3] = exp((turn + np.radians(cut_deg) * (times_s >= 0.2))[:, None] * axis)
     seen_at = np.radians(15.0) * (times_s + begins_s) ** 2 / 2.0 * 1.1
     R = exp((seen_at - seen_at[0])[:, None] * axis)
     job = SimpleNamespace(
@@ -117,7 +120,8 @@ def test_a_path_of_another_clip_or_time_is_warned_of(begins_s, codes):
         video=SimpleNamespace(path="a.mp4"),
     )
     seen = CameraMotion(R, np.ones(20, bool))
-    found = _doubts_about_path(job, CameraMotion.given(poses), seen)
+    cuts = np.array([2] if cut_deg else [], np.int64)
+    found = _doubts_about_path(job, CameraMotion.given(poses), seen, cuts)
     assert [each.code for each in found] == codes
 
 
