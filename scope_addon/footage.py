@@ -125,6 +125,19 @@ def numbered_from(first: Path) -> list[Path]:
     return numbered(first.parent, before, after, number)
 
 
+def sequence_from(first: Path) -> list[Path]:
+    """Return the pictures of a captured sequence from its first one on, counted by the last number
+    of their names that others continue: a pattern such as ``#_1080p.png`` has one elsewhere.
+    """
+    for number in reversed([*re.finditer(r"\d+", first.stem)]):
+        before = first.stem[: number.start()]
+        after = first.stem[number.end() :] + first.suffix
+        found = numbered(first.parent, before, after, int(number.group()))
+        if len(found) > 1:
+            return found
+    return [first]
+
+
 def continued(pictures: Iterable[Path]) -> set[Path]:
     """Return the pictures that continue the sequence of another of them."""
     sequences: dict[tuple[Path, str, str], list[tuple[int, Path]]] = {}

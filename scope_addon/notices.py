@@ -176,8 +176,8 @@ SENTENCES = {
     "because the scene does not have the footage's constant frame rate and the lens distorts; the "
     "motion keeps its speed",
     "image_numbers": "Blender cannot show the image sequence from {first} on, because images are "
-    "missing or their numbers are too large, so the camera shows that image only; renumber the "
-    "files consecutively to show all",
+    "missing, or their numbers are too large or not the last ones in their names, so the camera "
+    "shows that image only; number the files consecutively, at the end of their names, to show all",
     # files
     "left_over": "these files are of another capture, not part of this result: {files:names}; "
     "remove what you do not need",

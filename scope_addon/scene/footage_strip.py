@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 
 from ..errors import VideoError
-from ..footage import PICTURE_SUFFIXES, numbered_from
+from ..footage import PICTURE_SUFFIXES, sequence_from
 from ..motion import Motion
 from .datablocks import check_local
 from .timing import key_frames, rows_of_scene_frames
@@ -72,7 +72,7 @@ def add_footage_strips(
     added = []
     try:
         if path.suffix.lower() in PICTURE_SUFFIXES:
-            found = (numbered_from(path) if pictures else []) or [path]
+            found = sequence_from(path) if any(pictures) else [path]
             shown = [found[min(number, len(found) - 1)] for number in pictures] or [path]
             added.append(strips.new_image(path.stem, str(shown[0]), channel, start))
             for picture in shown[1:]:

@@ -308,14 +308,20 @@ def test_numbered_pictures_of_a_further_camera_are_shown_by_its_clock(
     assert [frame_shown(second, f) + 1 for f in range(5)] == expected
 
 
-def test_pictures_numbered_beyond_blenders_frames_are_warned_about(body, make_motion, tmp_path):
-    for number in (20261122101500, 20261122101501):
-        save_picture(tmp_path / f"{number}.png")
+@pytest.mark.parametrize(
+    "names",
+    [("20261122101500.png", "20261122101501.png"), ("1_1080p.png", "2_1080p.png")],
+    ids=["beyond its frames", "elsewhere than it counts"],
+)
+def test_pictures_that_blender_cannot_count_are_warned_about(body, make_motion, tmp_path, names):
+    for name in names:
+        save_picture(tmp_path / name)
     motion = make_motion(body, 2, image_size=(64, 48))
-    result = build_scene([motion], body, footage=tmp_path / "20261122101500.png", options=NEW_SCENE)
+    result = build_scene([motion], body, footage=tmp_path / names[0], options=NEW_SCENE)
     assert result.people[0].camera.data.background_images[0].image.source == "FILE"
     assert len(result.warnings) == 1
-    assert "the camera shows that image only" in str(result.warnings[0])
+    said = str(result.warnings[0])
+    assert "too large or not the last ones in their names, so the camera shows that image" in said
 
 
 def shown_by_blender(

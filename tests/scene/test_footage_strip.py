@@ -79,20 +79,21 @@ def test_a_picture_becomes_an_image_strip(tmp_path):
     assert add_footage_strips(bpy.context.scene, tmp_path / "still.png", 1.0)[0].type == "IMAGE"
 
 
-def test_a_sequence_shows_the_picture_of_each_frame(body, make_motion, tmp_path):
+@pytest.mark.parametrize("name", ["w_{:04d}.png", "{}_1080p.png"])
+def test_a_sequence_shows_the_picture_of_each_frame(body, make_motion, tmp_path, name):
     """Five pictures at 30 frames/s, the third of which is missing, in a scene with 60."""
     for number in (1, 2, 4, 5):
-        cv2.imwrite(str(tmp_path / f"w_{number:04d}.png"), np.zeros((16, 16, 3), np.uint8))
+        cv2.imwrite(str(tmp_path / name.format(number)), np.zeros((16, 16, 3), np.uint8))
     motion = make_motion(body, 4)
     motion.frames[:] = range(4)
     motion.timestamps[:] = np.array([0, 1, 3, 4]) / 30.0
     start, pictures = pictures_of_frames(motion, 11.0, 60.0)
     (strip,) = add_footage_strips(
-        bpy.context.scene, tmp_path / "w_0001.png", start, pictures, with_sound=False
+        bpy.context.scene, tmp_path / name.format(1), start, pictures, with_sound=False
     )
     shown = [element.filename for element in strip.elements]
     assert start == 11.0
-    assert [shown[k] for k in (0, 2, 6, 8)] == [f"w_{n:04d}.png" for n in (1, 2, 4, 5)]
+    assert [shown[k] for k in (0, 2, 6, 8)] == [name.format(n) for n in (1, 2, 4, 5)]
     assert len(shown) == 9
 
 
