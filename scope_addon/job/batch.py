@@ -16,7 +16,7 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from ...solver.errors import InputError
 from ..atomic_write import complete_file, resolve_link
 from ..errors import NO_PERSON, OutputError, UsageError
 from ..footage import FOOTAGE_SUFFIXES, display_text, is_url, json_text, unicode_text
-from ..temporary import remove
+from ..temporary import hold, release, remove
 from .clip_runner import LocalRunner, Runner
 from .clip_task import (
     FINISHED,
@@ -44,6 +44,7 @@ from .finished_clip import finished_file, has_content
 from .request import program_version
 
 REPORT_NAME = "scope-batch.json"
+LOCK_NAME = ".scope-batch.lock"
 STATUSES = ("done", "skipped", "no_person", "failed")
 OTHERS = "other_folders"  # the report's entries of clips of other folders, each with its folder
 # of the time that may be spent on writing the report, which grows with the number of clips
@@ -139,8 +140,8 @@ class Batch:
         :param runner: captures the clips; None for this machine.
         :return: the report; its ``exit_status`` is 1 if a clip failed, else 3 if a clip showed no
             person, else 0.
-        :raises UsageError: the folder contains no footage, or the output folder has results of the
-            same names from another one.
+        :raises UsageError: the folder contains no footage, or another batch writes to the output
+            folder, or it has results of the same names from another folder.
         :raises OutputError: the output folder cannot be created, or the report cannot be written.
         """
         clips = self.clips(recursive, views)
@@ -157,29 +158,30 @@ class Batch:
             raise OutputError(
                 f"cannot create the folder {out}: {error.strerror}; choose another with --out"
             ) from error
-        runner = runner or LocalRunner(self._program, jobs)
-        known = self._previous_entries(clips, runner.report().get("folder", str(self.folder)))
-        previous = known
-        if again:
-            previous = {n: e for n, e in known.items() if n in self._kept or n not in clips}
-        entries: dict[str, Entry] = {}
-        try:
-            # The tasks are made within the try, because a signal can arrive as soon as the first
-            # clip has begun.
-            for finished in runner.outcomes(self._tasks(clips, previous, again)):
-                for name, entry in finished.items():
-                    entries[name] = entry | _what_remains(entry, known.get(name, {}))
-                    _print_outcome(entry, f"{len(entries)}/{len(clips)}", say)
-                if finished:
-                    self._write_report(_in_order(entries, clips), previous, runner, last=False)
-                progress("clips", len(entries), len(clips))
-        except BaseException:
-            entries = runner.stop() | entries
-            with suppress(OutputError):
-                if entries:
-                    self._write_report(_in_order(entries, clips), previous, runner, last=True)
-            raise
-        return self._write_report(_in_order(entries, clips), previous, runner, last=True)
+        with _alone_in(out):
+            runner = runner or LocalRunner(self._program, jobs)
+            known = self._previous_entries(clips, runner.report().get("folder", str(self.folder)))
+            previous = known
+            if again:
+                previous = {n: e for n, e in known.items() if n in self._kept or n not in clips}
+            entries: dict[str, Entry] = {}
+            try:
+                # The tasks are made within the try, because a signal can arrive as soon as the
+                # first clip has begun.
+                for finished in runner.outcomes(self._tasks(clips, previous, again)):
+                    for name, entry in finished.items():
+                        entries[name] = entry | _what_remains(entry, known.get(name, {}))
+                        _print_outcome(entry, f"{len(entries)}/{len(clips)}", say)
+                    if finished:
+                        self._write_report(_in_order(entries, clips), previous, runner, last=False)
+                    progress("clips", len(entries), len(clips))
+            except BaseException:
+                entries = runner.stop() | entries
+                with suppress(OutputError):
+                    if entries:
+                        self._write_report(_in_order(entries, clips), previous, runner, last=True)
+                raise
+            return self._write_report(_in_order(entries, clips), previous, runner, last=True)
 
     def _tasks(
         self, clips: dict[str, Path], previous: dict[str, Entry], again: bool
@@ -317,6 +319,30 @@ def how_to_continue(again: bool) -> str:
     """
     command = "the same command without --again" if again else "the same command again"
     return f"finished clips are kept; run {command} to continue"
+
+
+@contextmanager
+def _alone_in(out: Path) -> Iterator[None]:
+    """Keep other batches from an output folder: of two at once, each would replace results of the
+    other of the same name, and its report.
+
+    :raises UsageError: another batch writes there.
+    """
+    lock = out / LOCK_NAME
+    try:
+        is_held = hold(lock)
+    except OSError:  # there are no locks, or nothing can be written there, which writing says
+        yield
+        return
+    if not is_held:
+        raise UsageError(
+            f"another batch writes to {out}, as {lock.name} there says; wait until it has ended, "
+            "or give another --out, or remove that file if none runs"
+        )
+    try:
+        yield
+    finally:
+        release(lock)
 
 
 def _what_remains(entry: Entry, before: Entry) -> Entry:

@@ -16,7 +16,7 @@ from scope.scope_addon import cli
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line import signals
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.job.batch import REPORT_NAME, Batch
+from scope.scope_addon.job.batch import LOCK_NAME, REPORT_NAME, Batch
 from scope.scope_addon.job.clip_runner import LocalRunner
 from scope.scope_addon.motion import Motion
 from scope.solver.errors import InputError
@@ -169,6 +169,25 @@ def test_results_of_another_folder_are_kept(folder, tmp_path):
     calls(renamed)
     assert batch(renamed, out).run(1)["counts"]["skipped"] == 2
     assert calls(renamed) == []
+
+
+def test_of_two_batches_at_once_in_one_folder_the_second_is_refused(tmp_path):
+    """Each would replace results of the other, and know nothing of them afterwards."""
+    day, other = tmp_path / "day", tmp_path / "other"
+    for each in (day, other):
+        each.mkdir()
+        (each / "a.mp4").write_text(each.name)
+    out = tmp_path / "out"
+
+    def run_other(stage, done, total):
+        with pytest.raises(UsageError, match=f"another batch writes to {out}, as .* --out"):
+            batch(other, out).run(1)
+
+    report = batch(day, out).run(1, progress=run_other)
+    assert report["counts"]["done"] == 1
+    assert (out / "a.npz").read_text() == "result of day"
+    assert calls_so_far(other) == []
+    assert sorted(path.name for path in out.iterdir()) == ["a.glb", "a.npz", REPORT_NAME]
 
 
 @pytest.mark.parametrize("later", ["fails", "is gone"])
@@ -434,6 +453,7 @@ def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path):
     wait_for(lambda: not any(runs(pid) for pid in pids))
     # Some of them, where a clip ended before it noticed that its parent is gone.
     results = {p.name for p in out.iterdir() if not re.fullmatch(RECORD, p.name)}
+    results.discard(LOCK_NAME)  # which the next batch removes
     assert results <= {"a.npz", "b.npz", "a.overlay.mp4", "b.overlay.mp4"}
     for path in out.glob("*.npz"):
         assert len(Motion.load(path)) == FRAMES
