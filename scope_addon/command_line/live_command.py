@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import ExitStack
@@ -27,7 +28,7 @@ from ..options.body_choice import chosen_body
 from ..output_paths import check_output, left_over, person_paths
 from ..temporary import is_held
 from .arguments import add_options, values_in_range
-from .outputs import check_outputs, confine
+from .outputs import check_outputs, confine, refuse_inputs
 from .signals import interrupted
 from .terminal import ProgressLine, print_message
 
@@ -219,6 +220,9 @@ def _finish_recording(journal: Path, record: Path | None) -> dict[str, Any]:
         return chosen
 
     recording, about = unfinished_recording(journal, paths)
+    # The recording names what it was made of, as options do otherwise.
+    named = [Path(about.body), Path(about.footage)]
+    refuse_inputs(paths(about.people), filter(os.path.isfile, named))
     saved = recording.save()
     remove_recording(journal)
     _tell_left_over(record or journal.with_suffix(".npz"), saved)

@@ -28,7 +28,7 @@ from scope.scope_addon.live.source import Picture
 from scope.scope_addon.live.unfinished import lock_of
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.temporary import release
-from scope.solver.body_file import load_body
+from scope.solver.body_file import ASSETS, load_body
 from scope.solver.errors import InputError
 from scope.solver.rotations import exp
 
@@ -189,6 +189,22 @@ def test_a_recording_with_another_body_is_not_finished(tmp_path, body):
     about = replace(read_about(recording._journal.path), fingerprint=1)
     with pytest.raises(UsageError, match="was recorded with another body than scope is now"):
         read_records(recording._journal.path, about, body)
+
+
+def test_a_finished_recording_replaces_no_body_that_it_was_recorded_with(tmp_path, body, capfd):
+    """The command names the recording alone, which names the body."""
+    own = Path(shutil.copy(ASSETS / "body" / "scope.npz", tmp_path / "own.npz"))
+    recording, _ = recorded(tmp_path / "a", body)
+    recording._journal.close()
+    line, _, records = recording._journal.path.read_bytes().partition(b"\n")
+    left = tmp_path / "left.recording"
+    about = json.dumps(json.loads(line) | {"body": str(own)})
+    left.write_bytes(about.encode() + b"\n" + records)
+    assert main(["live", str(left), "--record", str(own)]) == 2
+    assert f"{own} is the input itself" in capfd.readouterr().err
+    assert own.read_bytes() == (ASSETS / "body" / "scope.npz").read_bytes()
+    assert main(["live", str(left), "--record", str(tmp_path / "take.npz")]) == 0
+    recording.save()
 
 
 def test_what_still_grows_is_not_finished(tmp_path, body, capfd):
