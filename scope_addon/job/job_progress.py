@@ -60,15 +60,20 @@ class JobProgress:
         self,
         clock: Callable[[], float] = time.monotonic,
         earlier: Mapping[str, float] | None = None,
+        *,
+        may_compile: bool = False,
     ) -> None:
         """Begin at 0.
 
         :param clock: returns the time in seconds.
         :param earlier: seconds for each frame of the stages of an earlier capture of the same kind,
             if there was one.
+        :param may_compile: whether the solver may have to be compiled after the person was found,
+            if there was no earlier capture.
         """
         self._clock = clock
         self._earlier = dict(earlier or {})
+        self._may_compile = may_compile and not earlier
         self._stage_start = clock()
         self._stage_first = 0  # frames done when the stage began
         self._marks: list[tuple[float, int]] = []  # of this stage: times, and what was done then
@@ -133,10 +138,12 @@ class JobProgress:
         It is what the stage still takes at its own speed, and what those after it took in an
         earlier capture of the same kind, or else their usual part of the time that finding the
         person takes. Of several people, the last stages are less regular: there it may be off by
-        another 4 % of the job. The time before a stage's first frame, as for loading the networks,
-        says nothing about what is left.
+        another 4 % of the job. Before a stage's first frame, and before the solver was compiled,
+        nothing tells what is left.
         """
         if self.stage not in STAGES or self.stage == "starting":
+            return None
+        if self.stage == FINDING and self._may_compile:
             return None
         names = list(STAGES)
         if self._people > 1 and self.stage != FINDING:

@@ -39,7 +39,7 @@ from ..scene.stored_values import FrameSpan, in_scene
 from ..scene.timing import current_frame_kept
 from ..scene.window_scene import window_shows
 from ..untrusted.body_file import load_body
-from . import preview_picture
+from . import preview_picture, warm_up
 from .captures import hide_others, show_again
 from .declared_properties import option_values
 from .frame_rate_operators import rate_warnings
@@ -69,7 +69,10 @@ class CaptureJob:
         self._is_automatic = scene.scope.frame_rate == AUTOMATIC
         self._request = capture_request(scene)
         self._kind = kind_of(self._request.values)
-        self.progress = JobProgress(earlier=load_stage_times(self._cache.root, self._kind))
+        self.progress = JobProgress(
+            earlier=load_stage_times(self._cache.root, self._kind),
+            may_compile=not warm_up.is_compiled(),
+        )
         self._key = self._request.key(code_version(ROOT))
         self._captured: CachedCapture | None = self._cache.find(self._key)
         self.worker: WorkerProcess | None = None  # none if the result was cached

@@ -59,7 +59,7 @@ def step() -> float | None:
     timer calls this.
     """
     if WarmUp.process is None:
-        if _marker().exists() or not start():
+        if is_compiled() or not start():
             return None
     elif WarmUp.process.poll() is not None:
         if WarmUp.process.returncode == 0:
@@ -132,6 +132,13 @@ def draw(layout: bpy.types.UILayout) -> None:
 
 def _files() -> int:
     return sum(1 for _ in cache().kernels.glob("*/*.code"))
+
+
+def is_compiled() -> bool:
+    """Return whether no capture has to wait for the solver to be compiled; False if that is not
+    known.
+    """
+    return _marker().exists()
 
 
 def _marker() -> Path:

@@ -16,7 +16,7 @@ from scope.scope_addon.job.job_progress import JobProgress
 from scope.scope_addon.job.process import WorkerFailedError
 from scope.scope_addon.scene.camera import pixel_aspect
 from scope.scope_addon.scene.packed_motion import stored_motion
-from scope.scope_addon.ui import capture_job
+from scope.scope_addon.ui import capture_job, warm_up
 from scope.scope_addon.ui.capture_job import CaptureJob, capture_request
 from scope.scope_addon.ui.capture_operators import state
 from scope.scope_addon.ui.comparison import cameras_of
@@ -165,6 +165,24 @@ def test_the_next_capture_of_a_kind_knows_how_long_the_stages_took(
     job = CaptureJob(scene)
     job.close()
     assert job.progress._earlier["solving"] == pytest.approx(0.3)  # seconds for each of ten frames
+
+
+@pytest.mark.parametrize("is_compiled", [False, True])
+def test_the_remaining_time_is_known_only_once_the_solver_is_compiled(
+    fake_worker, monkeypatch, is_compiled
+):
+    if is_compiled:
+        warm_up._marker().parent.mkdir(parents=True)
+        warm_up._marker().touch()
+    now = [0.0]
+    monkeypatch.setattr(capture_job, "JobProgress", partial(JobProgress, lambda: now[0]))
+    fake_worker("time.sleep(600)")
+    job = CaptureJob(bpy.context.scene)
+    for second in range(20):
+        now[0] = float(second)
+        job.progress.update("finding the person", second, 40)
+    assert (job.progress.seconds_left is not None) == is_compiled
+    job.close()
 
 
 def test_blender_does_not_wait_for_a_worker_that_is_ending(fake_worker, tmp_path, monkeypatch):

@@ -74,6 +74,22 @@ def test_captures_have_the_stages_whose_shares_the_bar_shows(name):
         assert abs(took.get(stage, 0.0) / end - STAGES[stage] / (1.0 - loading)) < 0.12, stage
 
 
+def test_before_the_solver_is_compiled_nothing_is_said_of_what_is_left():
+    """Compiling takes minutes: a capture of 205 s, of whose frames half were found after 15 s."""
+    now = [0.0]
+    progress = JobProgress(clock=lambda: now[0], may_compile=True)
+    steps = [(second, "finding the person", 6 * second, 150) for second in range(1, 26)]
+    steps += [(26 + k, "compiling the solver", k, 102) for k in range(103)]
+    for second, stage, done, total in steps:
+        now[0] = float(second)
+        progress.update(stage, done, total)
+        assert progress.seconds_left is None, (second, stage)
+    for done in range(60):
+        now[0] += 0.5
+        progress.update("finding the shape", done, 100)
+    assert progress.seconds_left is not None
+
+
 def test_a_stage_that_slows_down_has_no_remaining_time_until_it_is_steady():
     now = [0.0]
     progress = JobProgress(clock=lambda: now[0])
