@@ -238,6 +238,7 @@ class PyavReader:
     the whole file, which differs where the frame rate varies; ``recorded_rate``: at which a phone
     says that it recorded slow motion, 0 if it does not; ``frame_count`` according to the container;
     ``is_counted``: whether the container counts frames, so that ``average_rate`` is true;
+    ``counts_frames_alone``: the same, and not also those that are lacking, as AVI does;
     ``shown_s``: for how many seconds it is shown, None if unknown. A video that was cut
     without re-encoding holds more frames than it shows. ``may_have_field_packets``: whether a
     packet may be one of the two fields of a frame, as in AVCHD. ``is_mirrored``,
@@ -273,6 +274,7 @@ class PyavReader:
         self.recorded_rate = _recorded_rate(container)
         duration_s = (container.duration or 0) / 1e6
         self.is_counted = self._stream.frames > 0
+        self.counts_frames_alone = self.is_counted and container.format.name != "avi"
         self.frame_count = float(self._stream.frames or round(duration_s * self.rate))
         if self._stream.duration and self._stream.time_base:
             self.shown_s: float | None = float(self._stream.duration * self._stream.time_base)

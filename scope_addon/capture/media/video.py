@@ -13,6 +13,7 @@ at a lower rate; the index and time of each frame are still those of the whole v
 
 from __future__ import annotations
 
+import math
 import queue
 import re
 import stat
@@ -50,6 +51,7 @@ cv2.setLogLevel(0)  # silent: failures are reported as exceptions
 # whatever the name.
 _LISTS = (b"ffconcat", b"#EXTM3U", b"<?xml", b"<MPD", b"v=0", b"[playlist]")
 _VARYING = Fraction(2, 100)  # of the rate, by which the average differs where it varies
+_SAME_S = 1e-6  # within which a frame is at a time, as in decoding
 _ONE_MISSING = 0.5  # frames, from which at least one is missing, or too many
 _SLOW_MOTION = 1.5  # recorded rate over that at which it plays; less is rounding, or a film's 24
 _LOST_S = 1.0  # at the end of a video whose container counts the frames
@@ -113,10 +115,14 @@ class Video:
         """Number of frames that an iteration yields, if the container's frame count is right."""
         if self._sequence is not None:
             return max(1, len(self._wanted_slots()))
-        length = self.frame_count / self.average_fps
-        start = Fraction(self.wanted.start_s)
-        end = Fraction(min(self.wanted.end_s, float(length)))
-        return max(1, round((min(end, length) - start) * self._expected_rate))
+        # Where the rate varies, there can be more frames than at the usual rate, and all count.
+        rate = float(self.average_fps)
+        first = max(0, math.ceil((self.wanted.start_s - _SAME_S) * rate))
+        last = self.frame_count - 1
+        if self.wanted.end_s < last / rate:
+            last = math.floor((self.wanted.end_s + _SAME_S) * rate)
+        steps = (last - first) * float(self._expected_rate) / rate
+        return max(1, math.floor(steps + 0.5) + 1)
 
     @property
     def length_s(self) -> float:
@@ -129,7 +135,6 @@ class Video:
     @property
     def _expected_rate(self) -> Fraction:
         """Number of frames per second of those that are expected."""
-        # Where the rate varies, there can be more frames than at the usual rate, and all count.
         rate = self.average_fps
         return rate if self.wanted.fps is None else min(self.wanted.fps, rate)
 
@@ -137,8 +142,8 @@ class Video:
         """Return the slots of a sequence's pictures in the range; none of other footage."""
         if self._sequence is None:
             return []
-        start_s = self.wanted.start_s - 1e-6
-        end_s = self.wanted.end_s + 1e-6
+        start_s = self.wanted.start_s - _SAME_S
+        end_s = self.wanted.end_s + _SAME_S
         return [slot for slot in self._sequence.slots if start_s <= float(slot / self.fps) <= end_s]
 
     @property
@@ -326,12 +331,11 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
             average_fps = average_fps or packets_fps
             if stated_fps is None or _varies(average_fps, fps):
                 fps = usual_fps
-        measured_fps = average_fps
         if not _varies(average_fps, fps):
             average_fps = fps
         # Frames that an even rate would have and the file has not, or the reverse: a phone leaves
         # some out, also where its rate counts as constant.
-        missing_frames = float(abs(measured_fps - fps)) * (reader.shown_s or 0.0)
+        missing_frames = abs(float(fps) * (reader.shown_s or 0.0) - reader.frame_count)
         recorded_speed = reader.recorded_rate / float(fps)
         count = reader.frame_count
         flip = ("Y" if reader.clockwise_deg % 180 == 0 else "X") if reader.is_mirrored else ""
@@ -342,7 +346,7 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
     video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
     video._average_fps = average_fps
     video._is_counted = reader.is_counted
-    video._is_even = reader.is_counted and missing_frames < _ONE_MISSING
+    video._is_even = reader.counts_frames_alone and missing_frames < _ONE_MISSING
     if recorded_speed > _SLOW_MOTION:
         video.recorded_speed = recorded_speed
     if _varies(average_fps, fps):
@@ -445,7 +449,7 @@ class _Decoder:
         while not self._stop.is_set() and (decoded := reader.read()) is not None:
             time = next_time(time, decoded[0], float(1 / video.source_fps))
             image = video.wanted.view.show(decoded[1])
-            if time > video.wanted.end_s + 1e-6:
+            if time > video.wanted.end_s + _SAME_S:
                 break
             if image.shape[:2] != (video.height, video.width):
                 image = cast(Uint8Array, cv2.resize(image, (video.width, video.height)))
@@ -488,7 +492,7 @@ class _Decoder:
         if video._sequence is not None:  # whose pictures are counted
             return (
                 index < video.frame_count
-                and video._sequence.time(index, video.fps) <= video.wanted.end_s + 1e-6
+                and video._sequence.time(index, video.fps) <= video.wanted.end_s + _SAME_S
             )
         # Both tests: a container that counts frames from its duration is wrong for a variable frame
         # rate.

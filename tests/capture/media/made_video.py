@@ -60,7 +60,7 @@ def write_film(
         context.thread_count = 1
         for tag in ("color_trc", "color_primaries", "colorspace", "color_range"):
             setattr(context, tag, getattr(frames[0], tag))
-        ticks = rate if times_s is None else 1000
+        ticks = rate if times_s is None or path.suffix == ".avi" else 1000  # AVI has whole frames
         stream.time_base = context.time_base = Fraction(1, ticks)
         for k, frame in enumerate(frames):
             shown = frame if frame.format.name == pixels else frame.reformat(format=pixels)

@@ -90,10 +90,11 @@ def test_frames_have_their_indices_where_the_range_begins_late_in_a_varying_rate
     assert_a_late_range_has_the_indices_of_the_whole(path)
 
 
-def test_frames_have_their_indices_where_few_are_missing(tmp_path: Path) -> None:
-    """The rate counts as constant: a phone has left out one frame of 90."""
+@pytest.mark.parametrize("name", ["missing.mp4", "missing.avi"])
+def test_frames_have_their_indices_where_few_are_missing(tmp_path: Path, name: str) -> None:
+    """The rate counts as constant: a phone has left out one frame of 90, which AVI counts too."""
     times = [k / FPS for k in range(SECONDS * FPS) if k != 25]
-    path = write(tmp_path / "missing.mp4", "mpeg4", times, {"g": "10"})
+    path = write(tmp_path / name, "mpeg4", times, {"g": "10"})
     with open_video(path) as video:
         assert video.average_fps == video.fps == FPS
     assert_a_late_range_has_the_indices_of_the_whole(path)
