@@ -94,11 +94,12 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
 def _send_recording(
     recording: PeopleRecording, poses_per_second: float, warnings: list[Notice], send: Send
 ) -> None:
-    """Write the motion files of a recording, and send its result.
+    """Write the motion files of a recording, and send its result. Its growing file stays until the
+    parent has built the motions.
 
     :raises ScopeError: nobody was seen in it, or a file cannot be written.
     """
-    saved = recording.save()
+    saved = recording.save(keeps_journal=True)
     camera = recording.camera
     facts = {
         "camera": camera.source if camera else "",

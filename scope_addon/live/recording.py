@@ -378,9 +378,11 @@ class PeopleRecording:
         )
         return Journal(keep.file, about, self._body, keep.say)
 
-    def save(self) -> list[Path]:
+    def save(self, keeps_journal: bool = False) -> list[Path]:
         """Write the motion files of those who were seen, each in another place if its own refuses.
 
+        :param keeps_journal: leave the growing file to whoever reads the motion files, unless the
+            disk is full.
         :raises NoPersonError: nobody was seen.
         :raises OutputError: a file is not in its own place; says where the recording is.
         """
@@ -389,7 +391,7 @@ class PeopleRecording:
         seen = [recording for recording in self._recordings if recording.first is not None]
         motions = {each.path: each.result(self.origin) for each in seen or self._recordings[:1]}
         elsewhere = self._saved(motions)
-        if self._journal is not None:
+        if self._journal is not None and (elsewhere or not keeps_journal):
             self._journal.remove()  # which may have been what has filled the disk
         moved = [self._moved(motions[path], path, other) for path, other in elsewhere.items()]
         if problems := [problem for problem in moved if problem]:

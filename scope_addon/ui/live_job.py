@@ -172,11 +172,15 @@ class LiveJob:
     def cancel(self) -> None:
         """End the process, and remove what was created and recorded."""
         self._end()
+        self._remove_recording()
+        if self._kept:
+            remove(unfinished_video(Path(self._kept)))
+
+    def _remove_recording(self) -> None:
+        """Remove the growing file of the process, once that has ended."""
         for path in self._cache.recordings():
             if path.stem == self.worker.job_folder.name:
                 remove_recording(path)
-        if self._kept:
-            remove(unfinished_video(Path(self._kept)))
 
     def _end(self) -> None:
         """End the process, and remove what was created. What was recorded stays on the disk."""
@@ -330,6 +334,7 @@ class LiveJob:
             self._rig.restore()
             self.warnings = self._retargeted(scene, built.people[0].armature, paths[0].name)
         self.worker.close()
+        self._remove_recording()
         if self._unfinished is not None:
             remove_recording(self._unfinished)
 

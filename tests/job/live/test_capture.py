@@ -149,6 +149,8 @@ def test_what_is_said_during_a_recording_is_in_its_result_and_a_turned_phone_end
     capture_live(request, folder, lambda event, **values: sent.append((event, values)), commands)
     event, result = sent[-1]
     assert event == "result"
+    # Until the parent has what the motion files hold.
+    assert len(list(live_capture.recordings_of(folder).glob("*.recording"))) == 1
     assert result["report"]["warnings"] == [
         "it is dark",
         "nothing came for 7 s (0.6 s into the recording)",

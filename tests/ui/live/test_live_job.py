@@ -255,6 +255,30 @@ def test_a_recording_whose_capture_did_not_end_by_itself_is_finished_later(live,
     assert not bpy.ops.scope.finish_recording.poll()
 
 
+@pytest.mark.parametrize("is_built", [True, False])
+def test_a_recording_stays_until_it_is_in_the_scene(live, recordings, monkeypatch, is_built):
+    """Its motion files are temporary, and go with the process's folder."""
+
+    def fail(*_):
+        raise UsageError("the motion ends after the last frame of the scene")
+
+    job = live(RECORDS.format(root=ROOT).replace("receive(); receive()", "receive(); finish()"))
+    until(job, lambda: job.has_body)
+    if is_built:
+        job.record()
+        to_end(job)
+        assert bpy.context.scene.scope.capture is not None
+        assert recordings() == []
+        return
+    monkeypatch.setattr(live_job, "build_capture", fail)
+    job.record()
+    with pytest.raises(UsageError, match="the motion ends"):
+        to_end(job)
+    (left,) = cache().unfinished_recordings()
+    assert left.stem == job.worker.job_folder.name
+    assert bpy.ops.scope.finish_recording.poll()
+
+
 def test_a_recording_that_cannot_be_finished_stays(live, recordings):
     job = live(RECORDS.format(root=ROOT))
     until(job, lambda: job.has_body)
