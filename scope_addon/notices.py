@@ -102,6 +102,9 @@ SENTENCES = {
     "left_out_of_views": "{footage} shows more people than were captured: at least {others} more, "
     "one of them at {place} (x, y in pixels, @ seconds). Capture everyone, --people all on the "
     "command line",
+    "seen_briefly": "{footage} shows people too briefly to capture them with the others: at least "
+    "{others}, one of them at {place} (x, y in pixels, @ seconds). Capture that part alone, with a "
+    "start and end time",
     # of several cameras, whose captures turn all videos alike
     "turned_view": "{footage}: the person lies or stands on the head in the picture from beginning "
     "to end. If this camera was turned, turn its video with another program first, because Turn "

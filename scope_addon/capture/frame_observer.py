@@ -27,7 +27,7 @@ from .perception.region import Region
 from .tracking.chosen_person import ChosenPerson, find_chosen, place_of
 from .tracking.face_tracker import FaceTracker
 from .tracking.hand_tracker import HandTracker
-from .tracking.people import people_of
+from .tracking.people import people_of, seen_briefly
 from .tracking.scene_cuts import SceneCuts
 from .tracking.search_schedule import MaskSchedule
 from .tracking.track import Track, Tracklet, make_track
@@ -106,7 +106,8 @@ class Observed:
     def tracks(
         self, most: int, chosen: ChosenPerson | None = None, speed: float = 1.0
     ) -> tuple[list[Track], list[ChosenPerson]]:
-        """Return the tracks of at most ``most`` people, and where others are, who are left out.
+        """Return the tracks of at most ``most`` people, and where others are, who are left out; if
+        there are fewer people, who was seen too briefly.
 
         :param chosen: who comes first; None: the most prominent one.
         :param speed: how many times as fast as it plays the footage was recorded, so that the gaps
@@ -122,8 +123,12 @@ class Observed:
         if chosen is not None and (people or doubtful):
             first = find_chosen(chosen, people, doubtful, self.timestamps)
             people = [first, *(person for person in people if person is not first)]
+            doubtful = [person for person in doubtful if person is not first]
         tracks = [make_track(self.frames, times.tolist(), person) for person in people[:most]]
-        return tracks, [place_of(person, self.timestamps) for person in people[most:]]
+        others = people[most:]
+        if 0 < len(people) < most:
+            others = seen_briefly(people, doubtful, times.tolist())
+        return tracks, [place_of(person, self.timestamps) for person in others]
 
     def continues(self, before: Observed) -> bool:
         """Return whether the frames that this window shares with the one before are the same images

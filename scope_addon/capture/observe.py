@@ -320,9 +320,14 @@ def _warnings_about_people(
     name = Path(video.path).name
     warnings = []
     if left_out:
+        are_brief = len(tracks) < most_people(options.people)
         warnings.append(
             notice(
-                "left_out" if options.chosen is None else "left_out_of_views",
+                "seen_briefly"
+                if are_brief
+                else "left_out"
+                if options.chosen is None
+                else "left_out_of_views",
                 footage=name,
                 others=len(left_out),
                 place=str(left_out[0]),

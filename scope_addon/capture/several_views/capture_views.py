@@ -550,11 +550,14 @@ def _cuts_by_first_clock(first: _View, view: _View, match: Match | None) -> list
 def _about_footage(
     views: Sequence[_View], options: CaptureOptions, said: Sequence[Notice]
 ) -> list[Notice]:
-    """Return what is to be said of the further videos themselves, and is not said yet."""
+    """Return what is to be said of the further videos themselves, and is not said yet; but not who
+    passes through one of them, for the people are those of the first one.
+    """
     warnings: list[Notice] = []
     for view in views:
         for warning in (*view.footage.warnings, *speed_warnings(view.video, options)):
-            if warning not in said and warning not in warnings:
+            is_said = warning in said or warning in warnings
+            if not is_said and warning.code != "seen_briefly":
                 warnings.append(warning)
     return warnings
 

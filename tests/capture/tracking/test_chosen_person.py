@@ -20,6 +20,7 @@ from scope.scope_addon.capture.tracking.chosen_person import (
 )
 from scope.scope_addon.capture.tracking.people import people_of
 from scope.scope_addon.capture.tracking.track import Track, Tracklet, make_track
+from scope.scope_addon.capture.tracking.tracker import MAX_PEOPLE
 from scope.scope_addon.errors import UsageError
 
 TIMES = (np.arange(90) / 30).tolist()
@@ -33,7 +34,7 @@ def person(x: float, side: float = 200.0, swing: float = 0.0, rows: range = rang
     values = []
     for row in rows:
         points = body + [x, 300.0] + rng.normal(scale=0.003 * side, size=(33, 2))
-        points[LIMBS, 0] += swing * side * np.sin(2 * np.pi * TIMES[row])
+        points[LIMBS, 0] += swing * side * np.sin(2 * np.pi * row / 30)
         values.append(np.column_stack([points, np.ones((33, 4))]).astype(np.float32))
     centers = [np.array([x, 300.0])] * len(rows)
     return Tracklet(list(rows), values, centers, [side] * len(rows))
@@ -95,6 +96,30 @@ def test_who_has_chosen_a_person_is_told_of_others_but_not_to_choose_one(tmp_pat
         said[options.chosen] = warning.code
     assert tracks[0].keypoints_px[0, :, 0].mean() == pytest.approx(600.0, abs=30.0)
     assert said == {None: "left_out", chosen: "left_out_of_views"}
+
+
+@pytest.mark.parametrize(
+    ("rows", "side", "most", "codes"),
+    [
+        (range(900, 935), 200.0, MAX_PEOPLE, ["seen_briefly"]),
+        (range(900, 935), 200.0, 1, []),  # nobody else was asked for
+        (range(900, 910), 200.0, MAX_PEOPLE, []),  # perhaps a mistake
+        (range(900, 935), 8.0, MAX_PEOPLE, []),  # on a poster
+    ],
+)
+def test_who_is_seen_for_a_second_of_a_minute_is_said_to_be_left_out(
+    tmp_path: Path, rows: range, side: float, most: int, codes: list[str]
+) -> None:
+    times_s = (np.arange(1800) / 30).tolist()
+    main = person(200.0, rows=range(1800))
+    observed = observed_of([main, person(600.0, side=side, rows=rows)], times_s)
+    video = SimpleNamespace(path=tmp_path / "walk.mp4", wanted=CaptureOptions().wanted)
+    tracks, others = observed.tracks(most)
+    said = _warnings_about_people(video, CaptureOptions(people=most), tracks, others)  # type: ignore[arg-type]
+    said = [each for each in said if each.code != "turned_footage"]  # these bodies are random
+    assert len(tracks) == 1
+    assert [each.code for each in said] == codes
+    assert [each.values["place"] for each in said] == ["600,300@30.57"] * len(codes)
 
 
 def test_a_place_without_a_person_is_refused_and_says_where_people_are() -> None:
