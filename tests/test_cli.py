@@ -89,6 +89,12 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
         ),
         (["capture", "--bvh-unit", "m", "-o", "{tmp}/a.glb"], 2, "-o OUT.bvh"),
         (["capture", "--shape-keys", "baked", "-o", "{tmp}/a.bvh"], 2, "-o OUT.glb"),
+        (["capture", "--deform-bones", "-o", "{tmp}/a.glb"], 2, "give --retarget RIG"),
+        (
+            ["capture", "--deform-bones", "--retarget", "{tmp}/rig.glb", "-o", "{tmp}/a.usdc"],
+            2,
+            "-o OUT.fbx",
+        ),
         (
             [
                 *("capture", "--shape-keys", "baked", "--retarget", "{tmp}/rig.glb"),

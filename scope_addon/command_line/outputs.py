@@ -234,6 +234,11 @@ def _check_output_options(args: argparse.Namespace, outputs: list[Path]) -> None
                 "--shape-keys needs an output with the body's mesh, such as -o OUT.glb, or "
                 "--formats glb in a batch"
             )
+    if args.deform_bones and not (args.retarget and suffixes & {".fbx", ".glb"}):
+        raise UsageError(
+            "--deform-bones leaves out bones of a rig in .fbx and .glb files: give --retarget RIG "
+            "and -o OUT.fbx, or --formats fbx in a batch"
+        )
     if args.bvh_unit != option("bvh_unit").default and ".bvh" not in suffixes:
         raise UsageError(
             "--bvh-unit needs an output in .bvh: give -o OUT.bvh, or --formats bvh in a batch"
@@ -346,7 +351,10 @@ def write_outputs(
         if not motions[0].image_size.any():  # imported, and never seen by a camera
             options = replace(options, resolution="keep", active_camera=False, with_camera=False)
         separate = ExportOptions(
-            separate=args.file_per_person, bvh_unit=args.bvh_unit, skeleton=args.skeleton
+            separate=args.file_per_person,
+            bvh_unit=args.bvh_unit,
+            deform_bones=args.deform_bones,
+            skeleton=args.skeleton,
         )
         if rigs:
             from ..scene.rig_export import export_on_rig

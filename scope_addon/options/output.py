@@ -102,6 +102,15 @@ OUTPUT_OPTIONS = (
         choices=SKELETONS,
     ),
     Option(
+        "deform_bones",
+        bool,
+        False,
+        _FILES | Place.EXPORT,
+        "leave out bones of a rig that deform nothing, such as controls, in .glb and .fbx files; "
+        "in .fbx, those with deforming bones below them stay",
+        blender=Property(label="Only Deform Bones"),
+    ),
+    Option(
         "file_per_person",
         bool,
         False,

@@ -178,6 +178,8 @@ class SCOPE_OT_export(SavingOperator):
             layout.prop(self, "bvh_unit")
         elif self.format not in _OF_MOTION:
             layout.prop(self, "shape")
+            if self.which == "RIG" and self.format in ("FBX", "GLB"):
+                layout.prop(self, "deform_bones")
             if self.which != "RIG":
                 layout.prop(self, "camera")
                 layout.prop(self, "separate")
@@ -214,6 +216,7 @@ class SCOPE_OT_export(SavingOperator):
             shape=self.shape.lower(),
             separate=self.separate,
             bvh_unit=self.bvh_unit.lower(),
+            deform_bones=self.deform_bones and self.which == "RIG",
             warn=warnings.append,
         )
 

@@ -117,7 +117,7 @@ def test_a_scene_shows_the_first_picture_of_folders_of_further_cameras(tmp_path,
     monkeypatch.setattr(export, "export_motions", exported)
     args = SimpleNamespace(
         command="capture", fps=30, shape_keys="keyed", file_per_person=False, bvh_unit="m",
-        skeleton="scope",
+        deform_bones=False, skeleton="scope",
     )  # fmt: skip
     motion = SimpleNamespace(image_size=np.array([8, 8]))
     output = tmp_path / "out.blend"

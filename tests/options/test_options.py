@@ -37,7 +37,7 @@ FLAGS = """
 --face --height --focal-mm --fov --calibration --offset --camera-path
 --no-smoothing
 --uneven-ground --treadmill --belt-speed
---shape-keys --bvh-unit --skeleton --file-per-person --retarget --rig-object
+--shape-keys --bvh-unit --skeleton --deform-bones --file-per-person --retarget --rig-object
 --bone-map --expression-map
 --retarget-root --detector --keypoints --provider --threads --json --quiet
 """.split()

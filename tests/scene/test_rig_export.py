@@ -18,6 +18,7 @@ from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import ExportOptions
 from scope.scope_addon.scene.rig_export import export_on_rig, export_rig
 from scope.scope_addon.scene.rig_file import check_rig
+from scope.scope_addon.scene.rig_retarget import guess_bone_map
 from scope.solver.errors import InputError
 
 from ..edit.walking import BODY, motion_of, walk
@@ -142,6 +143,42 @@ def test_a_rig_of_a_scene_in_centimetres_has_its_true_size(tmp_path, suffix):
     np.testing.assert_allclose(
         seen(read, bones.values(), [int(first) + 10]), wanted / 100, atol=1e-3
     )
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx"])
+def test_controls_that_deform_nothing_are_left_out_on_request(tmp_path, suffix):
+    """Each bone that deforms follows a control by a constraint and lies below another one."""
+    source = captured(MOTION)
+    rig, bone_of = build_rig("unreal")
+    limbs = [bone_of[part] for pair in ARMS for part in pair]
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name in limbs:
+        control = rig.data.edit_bones[name]
+        deforming = rig.data.edit_bones.new(f"DEF-{name}")
+        deforming.head = control.head
+        deforming.tail = control.tail
+        deforming.roll = control.roll
+        if control.parent.name in limbs:
+            deforming.parent = rig.data.edit_bones[f"DEF-{control.parent.name}"]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for bone in rig.data.bones:
+        bone.use_deform = bone.name.startswith("DEF-")
+    for name in limbs:
+        constraint = rig.pose.bones[f"DEF-{name}"].constraints.new("COPY_TRANSFORMS")
+        constraint.target = rig
+        constraint.subtarget = name
+    run(source, rig, guess_bone_map(rig))
+    names = [f"DEF-{name}" for name in limbs]
+    wanted = seen(rig, names, [11])
+    for deform_bones in (False, True):
+        path = tmp_path / f"rig{deform_bones}{suffix}"
+        export_rig(path, rig, ExportOptions(deform_bones=deform_bones))
+    for deform_bones in (False, True):
+        first = read_back(tmp_path / f"rig{deform_bones}{suffix}")
+        read = next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+        assert set(read.data.bones.keys()) >= set(names)
+        assert (bone_of["pelvis"] in read.data.bones) != deform_bones
+        np.testing.assert_allclose(seen(read, names, [int(first) + 10]), wanted, atol=1e-3)
 
 
 def test_a_pelvis_moves_under_a_bone_on_the_ground_in_bvh(tmp_path):

@@ -64,6 +64,7 @@ class ExportOptions:
     shape: str = "auto"
     separate: bool = False  # one file per person, also in formats that can hold several
     bvh_unit: str = "cm"  # of the lengths in .bvh: "cm" or "m"
+    deform_bones: bool = False  # leave out bones that deform nothing, in .glb and .fbx
     skeleton: str = OWN  # whose names the bones have, in all formats but .blend
     take: str = ""  # name of the animation; empty: the capture's
     unit: float = 0.0  # metres that a length of 1 stands for; 0: as ``unit_of_captures`` says
@@ -173,8 +174,12 @@ def _write_one(
             check_samples(scene, rigs)
         writers = {
             ".bvh": lambda temporary: formats.write_bvh(temporary, scene, rig, options.bvh_unit),
-            ".glb": lambda temporary: formats.write_glb(temporary, options.camera, take),
-            ".fbx": lambda temporary: formats.write_fbx(temporary, options.camera, take),
+            ".glb": lambda temporary: formats.write_glb(
+                temporary, options.camera, take, options.deform_bones
+            ),
+            ".fbx": lambda temporary: formats.write_fbx(
+                temporary, options.camera, take, options.deform_bones
+            ),
             ".usdc": lambda temporary: formats.write_usd(temporary, options.camera),
             ".blend": lambda temporary: formats.write_blend(temporary, scene),
         }

@@ -60,11 +60,14 @@ _HEADER = 12
 _CHUNK_HEADER = 8
 
 
-def write_glb(path: Path, camera: bool = False, take: str = "Animation") -> None:
+def write_glb(
+    path: Path, camera: bool = False, take: str = "Animation", deform_bones: bool = False
+) -> None:
     """Write the active scene as binary glTF: y up, metres, shape keys as morph targets, all motion
     in one animation.
 
     :param take: name of the animation.
+    :param deform_bones: leave out bones that deform nothing.
     :raises OutputError: Blender cannot write it.
     """
     enable_addon("io_scene_gltf2")
@@ -87,7 +90,7 @@ def write_glb(path: Path, camera: bool = False, take: str = "Animation") -> None
             export_morph_normal=True,
             export_morph_animation=True,
             export_rest_position_armature=True,
-            export_def_bones=False,
+            export_def_bones=deform_bones,
             export_leaf_bone=False,
             export_animations=True,
             export_animation_mode="ACTIVE_ACTIONS",
@@ -104,11 +107,14 @@ def write_glb(path: Path, camera: bool = False, take: str = "Animation") -> None
         )
 
 
-def write_fbx(path: Path, camera: bool = False, take: str = "Take") -> None:
+def write_fbx(
+    path: Path, camera: bool = False, take: str = "Take", deform_bones: bool = False
+) -> None:
     """Write the active scene as FBX: y up, centimetres, objects at scale 1, no leaf bones, every
     frame keyed from 0 s.
 
     :param take: name of the animation.
+    :param deform_bones: leave out bones that deform nothing, and carry none that do.
     :raises OutputError: Blender cannot write it.
     """
     enable_addon("io_scene_fbx")
@@ -127,7 +133,7 @@ def write_fbx(path: Path, camera: bool = False, take: str = "Take") -> None:
         add_leaf_bones=False,
         primary_bone_axis="Y",
         secondary_bone_axis="X",
-        use_armature_deform_only=False,
+        use_armature_deform_only=deform_bones,
         bake_anim=True,
         bake_anim_use_all_bones=True,
         bake_anim_use_nla_strips=False,
