@@ -20,7 +20,7 @@ from bpy.props import (
 from ..errors import UsageError
 from ..scene.character.correction_list import listed_corrections, store_corrections
 from ..scene.datablocks import captures_of, holds, is_person
-from ..scene.stored_values import LAST_FRAME
+from ..scene.stored_values import LAST_FRAME, start_frame
 from .captured_person import (
     EditOperator,
     SpanOperator,
@@ -73,13 +73,17 @@ def change_corrections(
     """
     from ..edit.corrected_motion import corrections_of, with_corrections
     from ..scene.character.corrected_keys import pinned_places, rewrite_changed_keys
+    from ..scene.character.other_curves import exchange_measurements
     from ..scene.packed_motion import stored_keys
+    from ..scene.timing import key_frames
 
     keep_machine_code()
     after = with_corrections(before, body, change(corrections_of(before)))
     keys = rewrite_changed_keys(
         armature, body, rate, before, after, stored_keys(armature), added, rise
     )
+    frames = key_frames(after.timestamps, rate, start_frame(armature))
+    exchange_measurements(armature, body, before, after, frames)
     is_changed = len(keys.times) > 0 or keys.rise != 0.0
     set_motion_of(armature, after, keys.to_bytes() if is_changed else b"")
     store_corrections(armature, after, rate, pinned_places(armature, body, rate, after))

@@ -19,12 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ...edit.corrected_motion import corrections_of
+from ...edit.corrections import Exchange
+from ...edit.spans import joints_of_limbs
+from ...kinematics.mirrored_limbs import other_side
 from ...motion import Motion
 from ...notices import REASONS
 from ...review_spans import find_review_spans
 from ..actions import (
     Channels,
     bone_property_path,
+    change_keys,
     fcurves,
     read_keys,
     rewrite_keys,
@@ -144,7 +149,9 @@ def key_measurements(
 
 
 def measurements_of(body: Body, motion: Motion) -> dict[tuple[str, str], NDArray[np.float64]]:
-    """Return the values (T,) by bone and property; NaN where one is not known."""
+    """Return the values (T,) by bone and property, with the sides exchanged as the corrections say;
+    NaN where one is not known.
+    """
     columns = {
         (name, CONFIDENCE): motion.joint_confidence[:, i] for i, name in enumerate(body.joint_names)
     }
@@ -155,7 +162,51 @@ def measurements_of(body: Body, motion: Motion) -> dict[tuple[str, str], NDArray
     }
     sigma_cm = 100.0 * np.asarray(motion.joint_sigma_m, float)
     columns |= {(name, SIGMA): sigma_cm[:, i] for i, name in enumerate(body.joint_names)}
+    for exchange in corrections_of(motion):
+        if isinstance(exchange, Exchange):
+            rows = (motion.frames >= exchange.first) & (motion.frames <= exchange.last)
+            limbs = {body.joint_names[k] for k in joints_of_limbs(body, exchange.limbs)}
+            others = {
+                (name, what): columns[other_side(name), what]
+                for name, what in columns
+                if name in limbs
+            }
+            columns |= {
+                names: np.where(rows, other, columns[names]) for names, other in others.items()
+            }
     return columns
+
+
+def exchange_measurements(
+    armature: bpy.types.Object,
+    body: Body,
+    before: Motion,
+    after: Motion,
+    frames: NDArray[np.float64],
+) -> None:
+    """Change the keys of measurements where another correction exchanges left and right, so that
+    the foot that rests in the user's eyes has the contact.
+
+    :param after: the same motion as ``before`` with other corrections.
+    :param frames: (T,) scene frames of its rows.
+    """
+    was = measurements_of(body, before)
+    now = measurements_of(body, after)
+    changed = {
+        bone_property_path(*names): names
+        for names in now
+        if not np.array_equal(was[names], now[names], equal_nan=True)
+    }
+    for curve in _curves(armature) if changed else ():
+        names = changed.get(curve.data_path)
+        if names is None:
+            continue
+        at = read_keys(curve)[:, 0].astype(float)
+        old, new = (
+            np.interp(at, frames[np.isfinite(column)], column[np.isfinite(column)])
+            for column in (was[names], now[names])
+        )
+        change_keys(curve, at[old != new], new[old != new])
 
 
 def add_review_markers(

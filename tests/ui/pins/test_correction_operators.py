@@ -317,6 +317,38 @@ def test_an_exchange_swaps_the_sides_and_once_more_swaps_them_back(rig):
     assert listed_corrections(rig) == []
 
 
+def measured(armature, frame, bones, what):
+    """Custom properties of bones in a frame, as drivers read them."""
+    bpy.context.scene.frame_set(frame)
+    posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
+    return [posed[name][what] for name in bones]
+
+
+@pytest.mark.parametrize("limbs", ["legs", "arms", "both"])
+def test_the_contact_and_confidence_of_exchanged_limbs_are_exchanged(limbs):
+    rng = np.random.default_rng(7)
+    motion = motion_of(walk(3.0))
+    contact = rng.uniform(size=(len(motion), 4)).astype(np.float32)
+    confidence = rng.uniform(size=motion.joint_confidence.shape).astype(np.float32)
+    armature = captured_with(replace(motion, foot_contact=contact, joint_confidence=confidence))
+    legs = ["left_ankle", "left_foot", "right_ankle", "right_foot"]
+    arms = ["left_wrist", "right_wrist"]
+    other = {"legs": [2, 3, 0, 1], "arms": [1, 0]}
+    for exchanges in range(3):  # the second one undoes the first
+        for frame in (20, FRAME, 70):
+            row = frame - 1
+            is_exchanged = frame == FRAME and exchanges == 1
+            at = {"legs": contact[row], "arms": confidence[row, [NAMES.index(n) for n in arms]]}
+            for part in at:
+                if is_exchanged and limbs in (part, "both"):
+                    at[part] = at[part][other[part]]
+            found = measured(armature, frame, legs, "contact")
+            np.testing.assert_allclose(found, at["legs"], atol=1e-6)
+            found = measured(armature, frame, arms, "confidence")
+            np.testing.assert_allclose(found, at["arms"], atol=1e-6)
+        bpy.ops.scope.exchange_sides(start=40, end=52, limbs=limbs)
+
+
 def move_keys(rig, factor, shift):
     """Move all keys in time as in the Dope Sheet."""
     for curve in fcurves(rig):
