@@ -108,6 +108,27 @@ def test_of_several_frames_2d_keypoints_alone_show_it(change, message):
         solver.fit_batch(body, frames)
 
 
+def left_for_right(p):
+    """COCO's keypoints, nose first, then pairs."""
+    return p[[0, *(k + 1 if k % 2 else k - 1 for k in range(1, 17))]]
+
+
+@pytest.mark.parametrize("change", [from_right, left_for_right])
+def test_of_some_people_2d_keypoints_alone_show_that_left_and_right_are_exchanged(change):
+    """Of most, the body that faces the other way fits as well."""
+    body, everyone = people()
+    seen = [replace(each.seen, keypoints3d=None) for each in everyone]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for each in seen:
+            solver.fit(body, each)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        for each in seen:
+            solver.fit(body, in_image(each, change))
+    assert "exchange left and right in the names" in " ".join(str(each.message) for each in told)
+
+
 def rolled(person, turns):
     """The measurements of a camera that is rolled by quarter turns."""
     R = rotations.exp([0.0, 0.0, 0.5 * np.pi * turns])
