@@ -26,6 +26,7 @@ from ..measurements import Measurements
 from ..options import Options, Priors, given_priors
 from ..part import Array, Pose
 from ..points import has_names, with_numbers
+from ..residuals.registry import column_of
 from ..rotations import nearest_rotation
 from ..state import State, Status, given_states
 from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
@@ -114,7 +115,7 @@ def fit_motion(
         triangulated from their 2D keypoints, or by one of them where their rays are too parallel.
     :param priors: `default_priors(body)` unless given.
     :param options: the stages are those of a fit that starts from a state; `report` has no effect.
-    :param motion: weights of acceleration and of standing points.
+    :param motion: weights of acceleration and of standing points; how long a pose is remembered.
     :param stands: points that may stand still, with the probability that they do.
     :param shape: (P,) where it is known; it is then kept.
     :param focal: whether to estimate one focal length for all cameras, as a scale of that of their
@@ -166,7 +167,10 @@ def fit_motion(
         terms = MotionTerms.make(
             tree, clock, motion, StandingPoints() if stands is None else stands
         )
-        clip = _Clip(tree, views, terms, states, priors, options, focal_weight, covariance, pool)
+        share = motion.pose_share(clock)
+        clip = _Clip(
+            tree, views, terms, states, priors, options, share, focal_weight, covariance, pool
+        )
         found = clip.solve(make_tree(body, focal), shape, overlapping(clock, window, overlap))
     if by_default and not has_wrong_cameras:
         chosen = some_of(views)
@@ -187,8 +191,8 @@ def fit_motion(
 
 
 def _weighs_by_default(motion: MotionPrior) -> bool:
-    """Return whether the weights of the root's acceleration are the default ones, those of 60
-    frames per second.
+    """Return whether the weights of the root's acceleration are the default ones, which count in
+    seconds.
     """
     default = MotionPrior.root_rotation, MotionPrior.root_position
     return (motion.root_rotation, motion.root_position) == default
@@ -242,6 +246,7 @@ class _Clip:
     init: Sequence[State]
     priors: Priors
     options: Options
+    pose_share: float  # of the joints' priors, in each frame
     focal_weight: float
     covariance: bool
     pool: ThreadPoolExecutor | None
@@ -301,6 +306,8 @@ class _Clip:
         focal_weight = self.focal_weight if tree.globals > P else None
         shared = SharedPriors(*priors.packed_shape(P), focal_weight)
         settings = make_settings(self.options, self.options.schedule(cold=False))
+        for name in ("joint_prior", "joint_flow"):
+            settings.stages[:, 0, column_of(name)] *= self.pose_share
         motion = self.motion.part(window.frames)
         problem = ClipProblem(tree, views, motion, shared, settings, self.pool)
         optimizer = Optimizer(problem, poses, self.pool)

@@ -36,29 +36,47 @@ class MotionPrior:
     (rad/s^2)^2, of joints (K,) or one for all; robust_root_position: (m/s^2)^2. Infinity turns the
     kernel off. contact: weight of standing points, s/m^2.
 
-    The defaults suit keypoints of a network at 60 frames per second. Errors of a network in
-    neighbouring frames are alike, so that more frames say less than their number: at other rates,
-    weights of acceleration times (rate / 60)^2 were found better. Markers, whose errors are
-    independent, need less.
+    The defaults are how recorded people accelerate, and suit errors that are independent from frame
+    to frame. A network's are not: more frames say less than their number, and weights of 1, 1 and
+    30 times (rate / 60 Hz)^2 were found better for its keypoints.
+
+    pose_memory: tau, seconds in which poses become unlike. The density of joints in `Priors` is
+    that of one pose, and neighbouring frames show nearly the same one. A stationary process of
+    correlation exp(-h / tau) after h seconds tells of its mean what
+        1 + sum over intervals of tanh(h / (2 tau))
+    independent samples do; so often do the priors of the joints count in a clip, whatever its frame
+    rate. 0: once a frame.
     """
 
-    joints: ArrayLike = 1.0
-    root_rotation: float = 1.0
-    root_position: float = 30.0
+    joints: ArrayLike = 0.03
+    root_rotation: float = 0.1
+    root_position: float = 1.0
     robust_joints: ArrayLike = 4e4
     robust_root_rotation: float = 4e4
     robust_root_position: float = 1600.0
     contact: float = 3e3
+    pose_memory: float = 0.2
 
     def __post_init__(self) -> None:
         """Check the values.
 
-        :raises InvalidValueError: a weight is negative or infinite, or a sigma is not positive.
+        :raises InvalidValueError: a weight or the memory is negative or infinite, or a sigma is not
+            positive.
         """
-        for name in ("root_rotation", "root_position", "contact"):
+        for name in ("root_rotation", "root_position", "contact", "pose_memory"):
             check_weight(getattr(self, name), f"MotionPrior.{name}")
         for name in ("robust_root_rotation", "robust_root_position"):
             check_robust(getattr(self, name), f"MotionPrior.{name}")
+
+    def pose_share(self, times: Array) -> float:
+        """Return how much the priors of the joints count in each frame of a clip, 1 for one frame.
+
+        :param times: (T,) seconds, increasing.
+        """
+        if self.pose_memory == 0.0:
+            return 1.0
+        new = np.tanh(np.diff(times) / (2.0 * self.pose_memory))
+        return float((1.0 + new.sum()) / len(times))
 
     def packed(self, K: int) -> Array:
         """Return (K+2, 2) weights and 1/sigma: the root's rotation, joints 1..K, the root's

@@ -160,6 +160,7 @@ def motion_priors(body: Body, times: Float64Array) -> tuple[MotionPrior, MotionP
         robust_root_rotation=np.inf,
         robust_root_position=np.inf,
         contact=_CONTACT,
+        pose_memory=0.0,  # the weights of the priors were chosen with every frame counting
     )
     return quadratic, replace(
         quadratic,

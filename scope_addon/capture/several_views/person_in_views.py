@@ -262,7 +262,9 @@ def fit_views_alone(prepared: PreparedTrack, start: FittedTrack) -> FittedTrack:
         init=states,
         priors=prepared.priors,
         options=replace(ROBUST, stages=clip_stages(prepared.weights)),
-        motion=MotionPrior(joints=0.0, root_rotation=0.0, root_position=0.0, contact=0.0),
+        motion=MotionPrior(
+            joints=0.0, root_rotation=0.0, root_position=0.0, contact=0.0, pose_memory=0.0
+        ),
         shape=start.betas,
     )
     return _fitted(prepared, frames, found)

@@ -8,6 +8,7 @@ import pytest
 from scope.solver import (
     Keypoints2D,
     Measurements,
+    MotionPrior,
     Options,
     Stage,
     State,
@@ -18,6 +19,8 @@ from scope.solver import (
 )
 
 from .. import person
+
+STIFF = MotionPrior(joints=1.0, root_rotation=1.0, root_position=30.0, pose_memory=0.0)
 
 
 def both_fits(seed):
@@ -39,7 +42,7 @@ def both_fits(seed):
         frames.append(Measurements(person.INTRINSICS, keypoints))
         starts.append(replace(state, Omega=first.Omega))
     options = Options(stages=[Stage(Weights(keypoints2d=1e5, joint_prior=4.0), 1e-9, 200)])
-    given = {"init": starts, "shape": first.beta}
+    given = {"init": starts, "shape": first.beta, "motion": STIFF}
     learned = fit_motion(body, frames, times, options=options, **given)
     plain = fit_motion(body, frames, times, options=replace(options, curvature=False), **given)
     return learned, plain

@@ -18,12 +18,15 @@ from scope.solver import (
     State,
     Status,
     Weights,
+    load_body,
     rotations,
 )
+from scope.solver.body_file import ASSETS
 from scope.solver.gauss_newton.optimizer import MIN_DAMPING
 from scope.solver.motion.fit import fit_motion
 from scope.solver.motion.prior import MotionPrior, StandingPoints
 from scope.solver.motion.views import View
+from scope.solver.names import COCO
 
 from ..synthetic import RandomBody, forward, random_body
 from .clips import K, P, noisy_clip, walk
@@ -109,6 +112,40 @@ def test_covariance_and_estimate_of_linear_motion_in_closed_form():
     chi = np.mean((found.t_world_part[:, 0] - truth) ** 2 / expected[:, None])
     assert 0.2 < chi < 1.5
     assert expected[T // 2] < 0.3 / weight
+
+
+def test_errors_of_recorded_motion_are_as_large_as_stated():
+    """Two thirds of a second at a time of the sample's recording, keypoints with 1 cm of noise: the
+    errors of all joints over the stated deviations, with the default weights.
+    """
+    body = load_body("scope")
+    with np.load(ASSETS / "sample" / "sample_truth.npz") as data:
+        turns = rotations.exp(data["poses"].reshape(-1, 24, 3).astype(float))
+        places = data["trans"].astype(float)
+        beta = data["betas"].astype(float)
+    points = [f"coco/{name}" for name in COCO[:17]]
+    index = [body.point(name) for name in points]
+    rng = np.random.default_rng(0)
+    squares = []
+    distances = []
+    for first in (0, 50, 100):
+        rows = slice(first, first + 20)
+        poses = [
+            body.forward_kinematics(R, t, beta)
+            for R, t in zip(turns[rows], places[rows], strict=True)
+        ]
+        true = np.array([t for _, t in poses])
+        seen = np.array([body.keypoints(R, t, beta, index) for R, t in poses])
+        noisy = Keypoints3D(points, seen + 0.01 * rng.standard_normal(seen.shape), sigma_m=0.01)
+        found = fit_motion(
+            body, Measurements(keypoints3d=noisy), np.arange(20) / 30.0, covariance=True
+        )
+        off = found.t_world_part - true
+        whitened = np.linalg.solve(found.joint_covariance, off[..., None])[..., 0]
+        squares.append(np.sum(off * whitened, axis=-1) / 3.0)
+        distances.append(np.linalg.norm(off, axis=-1))
+    assert 0.8 < np.sqrt(np.mean(squares)) < 1.2
+    assert np.mean(distances) < 0.013
 
 
 def test_reversed_in_time_the_motion_is_the_same():

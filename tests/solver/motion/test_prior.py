@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from scope.solver import ShapeError
+from scope.solver import InvalidValueError, ShapeError
 from scope.solver.motion.prior import MotionPrior, StandingPoints
 
 
@@ -25,10 +25,22 @@ def test_weights_and_kernels_have_their_rows() -> None:
     np.testing.assert_array_equal(MotionPrior(7.0).packed(2)[1:3, 0], [7.0, 7.0])
 
 
+def test_a_pose_counts_as_often_as_a_process_with_its_memory_tells_of_its_mean() -> None:
+    """The information 1ᵀ C⁻¹ 1 on the mean, of samples at uneven times with correlation C."""
+    times = np.cumsum(np.random.default_rng(0).uniform(0.01, 0.5, 12))
+    C = np.exp(-np.abs(times[:, None] - times) / 0.3)
+    independent = np.linalg.solve(C, np.ones(12)).sum()
+    prior = MotionPrior(pose_memory=0.3)
+    np.testing.assert_allclose(12 * prior.pose_share(times), independent, rtol=1e-12)
+    assert prior.pose_share(times[:1]) == 1.0
+    assert MotionPrior(pose_memory=0.0).pose_share(times) == 1.0
+
+
 @pytest.mark.parametrize(
     ("prior", "error"),
     [
         (lambda: MotionPrior([1.0, 2.0]).packed(3), ShapeError),
+        (lambda: MotionPrior(pose_memory=-0.1), InvalidValueError),
     ],
 )
 def test_what_is_no_weight_is_refused(prior, error) -> None:
