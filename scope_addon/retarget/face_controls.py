@@ -108,11 +108,11 @@ def _motion(
     if eye is not None:
         moved = moved + _around(eye, rest.head, turned, frame)
         turned = np.zeros_like(turned)
-    location_axes = to_face if rest.local_location else frame.axes
+    location_axes = rest.rotation if rest.location_axes is None else rest.location_axes
     return BoneMotion(
         bone,
         rotations=to_face @ exp(np.radians(turned)) @ to_face.T,
-        locations=moved @ location_axes.T,
+        locations=moved @ frame.axes.T @ location_axes,
     )
 
 
@@ -156,7 +156,8 @@ class RestBone:
 
     head: Float64Array  # (3,)
     rotation: Float64Array  # (3, 3) bone to armature
-    local_location: bool = True  # whether its location is in its own axes, not the armature's
+    # (3, 3) axes of its location as columns, in the armature's space; None: its own
+    location_axes: Float64Array | None = None
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,7 @@ from .character.expression_keys import MOVES, has_expression_keys
 from .rig_action import (
     channel_of_rotation,
     leave_tweak_mode,
+    location_axes,
     mark_written,
     override_nla,
     replace_action,
@@ -275,7 +276,7 @@ def face_keys(
         bone.name: RestBone(
             np.array(bone.head_local, float),
             np.array(bone.matrix_local.to_3x3(), float),
-            bone.use_local_location,
+            location_axes(bone),
         )
         for bone in bones
     }

@@ -39,11 +39,16 @@ def root_locations(
     """
     world = place[:3, :3]
     moved: NDArray[np.float64] = (heads - skeleton.heads[root]) @ np.linalg.inv(world).T
-    bone = rig.pose.bones[skeleton.names[root]].bone
     # not by the bone's axes in the world, which a scale of three factors shears
-    if bone.use_local_location:
-        moved = moved @ np.array(bone.matrix_local.to_3x3(), float)
-    return moved
+    return moved @ location_axes(rig.data.bones[skeleton.names[root]])
+
+
+def location_axes(bone: bpy.types.Bone) -> NDArray[np.float64]:
+    """Return the axes (3, 3) of a bone's location channel at rest as columns, in the armature's
+    space: its own, or, without *Local Location*, those of its parent.
+    """
+    owner = bone if bone.use_local_location else bone.parent
+    return np.array(owner.matrix_local.to_3x3(), float) if owner is not None else np.eye(3)
 
 
 def write_action(

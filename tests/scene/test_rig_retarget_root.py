@@ -46,6 +46,26 @@ def rigs_matrices(rig, frames=(1, 20, 50)):
     return np.array(out)
 
 
+@pytest.mark.parametrize("has_parent", [False, True])
+def test_a_pelvis_without_local_location_is_where_one_with_it_is(source, has_parent):
+    """Its location is along the axes of its parent, of which rigs have one on the ground that
+    points forwards; without a parent, along the armature's.
+    """
+    rig, bone_of = build_rig("mixamo")
+    if has_parent:
+        bpy.ops.object.mode_set(mode="EDIT")
+        ground = rig.data.edit_bones.new("ground")
+        ground.tail = (0.1, -0.3, 0.05)
+        ground.roll = 0.7
+        rig.data.edit_bones[bone_of["pelvis"]].parent = ground
+        bpy.ops.object.mode_set(mode="OBJECT")
+    run(source, rig)
+    expected = seen(rig, bone_of.values())
+    rig.data.bones[bone_of["pelvis"]].use_local_location = False
+    assert run(source, rig).warnings == []
+    np.testing.assert_allclose(seen(rig, bone_of.values()), expected, atol=1e-4)
+
+
 @pytest.mark.parametrize("matrix", [FBX, TURNED])
 def test_on_an_object_the_rig_looks_the_same(source, matrix):
     rig, bone_of = build_rig("mixamo", matrix=matrix)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.scope_addon.kinematics.face import EXPRESSIONS
@@ -59,6 +61,17 @@ def posed(bones, motions):
         )
         for m in motions
     }
+
+
+def test_a_control_whose_location_is_not_along_its_own_axes_moves_the_same_way():
+    bones = face()
+    chosen = ExpressionMap({}, {"lip.B": {"up": {"jawOpen": -0.5}, "left": {"jawOpen": 0.1}}})
+    (expected,) = posed(bones, control_motions(chosen, weights(jawOpen=0.5), bones)).values()
+    axes = exp(np.array([0.3, -0.8, 1.1]))
+    bones["lip.B"] = replace(bones["lip.B"], location_axes=axes)
+    (motion,) = control_motions(chosen, weights(jawOpen=0.5), bones)
+    head = bones["lip.B"].head + axes @ motion.locations[0]
+    np.testing.assert_allclose(head, expected[0], atol=1e-9)
 
 
 def test_amounts_are_shares_of_the_faces_lengths_along_its_axes():
