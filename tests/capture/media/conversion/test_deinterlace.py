@@ -14,6 +14,7 @@ from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 
 from ..made_video import write_film
+from .made_field_pictures import write_field_pictures
 from .made_frames import av, marked, with_fields
 
 HEIGHT = 48
@@ -162,6 +163,27 @@ def test_files_are_read_without_combs(tmp_path: Path, name: str) -> None:
     )
     assert min(combs(frame.to_ndarray(format="rgb24")) for frame in decoded) > 100
     assert max(combs(frame.image_rgb) for frame in frames) < 40
+
+
+def test_fields_that_are_pictures_of_their_own_are_read_as_frames(tmp_path: Path) -> None:
+    """As camcorders write them. The bar moves by 3 pixels per field, and is where the first field
+    has it; a part begins in the same frame.
+    """
+    pictures = [moving_bar(k)[..., 0].repeat(2, 0)[:96] for k in range(100)]
+    path = write_field_pictures(tmp_path / "a.mts", pictures)
+    with av.open(str(path)) as container:
+        packets = [packet for packet in container.demux(video=0) if packet.size]
+    assert len(packets) == len(pictures)
+    with open_video(path) as video:
+        assert (video.fps, video.average_fps, video.expected_frames) == (25, 25, 50)
+        frames = list(video)
+    assert [f.timestamp_s for f in frames] == pytest.approx([k / 25 for k in range(50)])
+    for k, frame in enumerate(frames):
+        assert combs(frame.image_rgb) < 40
+        light = np.flatnonzero(frame.image_rgb[48, :, 1] > 150)
+        assert light.tolist() == [6 * k % 72 + i for i in range(12)]
+    with open_video(path, VideoRange(1.0, 1.2)) as video:
+        assert [frame.index for frame in video] == [25, 26, 27, 28, 29, 30]
 
 
 def images(path: Path, wanted: VideoRange | None = None) -> dict[int, tuple[float, np.ndarray]]:
