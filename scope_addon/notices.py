@@ -196,6 +196,9 @@ SENTENCES = {
     "blocked_bones": "these bones of '{rig}' cannot follow the motion: {bones:names}; mute the "
     "constraints or drivers that control them, such as IK, or put the bones that control them "
     "into the list",
+    "posed_bones": "the pose of these bones of '{rig}', which are not in the list, moves or turns "
+    "the motion: {bones:names}; clear it in Pose Mode (Alt G, Alt R, Alt S) for the motion as "
+    "captured",
     "modifiers_left_out": "{file} does not show '{mesh}' as its modifiers do: {modifiers:names}; "
     "apply or remove these, and export again",
     "shape_keys_left_out": "{file} lacks these shape keys of '{mesh}', with which its modifiers "

@@ -25,7 +25,7 @@ from ..retarget.bone_map import PHALANGES, check_bone_count
 from ..retarget.fingers import bone_ends
 from ..retarget.rest_pose import RestPose
 from ..retarget.skeleton import BoneMotion, Skeleton
-from .actions import assign_action, used_slot
+from .actions import assign_action, bone_path, fcurves_of, nla_strips, used_slot
 from .character.root_object import root_object, topmost
 from .datablocks import changed, is_deformed_by, modifiers_off
 from .visibility import evaluated
@@ -39,6 +39,7 @@ _MIN_RESPONSE = 0.1
 _MAX_CHECKED_FRAMES = 10
 _MAX_DEVIATION = np.radians(20)
 _MAX_SHIFT = 0.05  # of the root bone's head from where it should be, as a share of the rig's size
+_VISIBLE = 1e-3  # of a bone's pose: radians, factors and shares of its length
 # The part that carries each part of a limb; hips and shoulders move with the pelvis.
 _CARRIED_BY = {"knee": "hip", "ankle": "knee", "elbow": "shoulder", "wrist": "elbow"}
 # Of the lowest bone from the rig's origin, as a share of the rig's size.
@@ -264,6 +265,40 @@ def blocked_bones(
     is_blocked[root] |= shift > _MAX_SHIFT
     blocked = [name for name, blocks in zip(names, is_blocked, strict=True) if blocks]
     return [notice("blocked_bones", bones=blocked, rig=rig.name)] if blocked else []
+
+
+def posed_bones(rig: bpy.types.Object, names: Sequence[str]) -> list[Notice]:
+    """Return a warning about bones above mapped ones that are posed or in the NLA: they move the
+    motion, which was measured with them at rest.
+
+    :param names: of the mapped bones.
+    """
+    above = dict.fromkeys(
+        bone.name for name in names for bone in rig.data.bones[name].parent_recursive
+    )
+    in_nla = {
+        curve.data_path
+        for strip in nla_strips(rig)
+        if strip.action
+        for curve in fcurves_of(strip.action)
+    }
+    moving = [
+        name
+        for name in above
+        if name not in names
+        and (
+            _is_posed(rig.pose.bones[name])
+            or any(path.startswith(bone_path(name, "")) for path in in_nla)
+        )
+    ]
+    return [notice("posed_bones", bones=moving, rig=rig.name)] if moving else []
+
+
+def _is_posed(bone: bpy.types.PoseBone) -> bool:
+    """Return whether a bone is moved, turned or scaled, visibly."""
+    offset = np.array(bone.matrix_basis, float) - np.eye(4)
+    offset[:3, 3] /= bone.length
+    return bool(np.abs(offset).max() > _VISIBLE)
 
 
 def _farthest_frames(keys: Sequence[BoneMotion], path: NDArray[np.float64]) -> list[int]:

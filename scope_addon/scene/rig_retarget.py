@@ -48,7 +48,7 @@ from .rig_action import (
     root_locations,
     write_action,
 )
-from .rig_probe import at_rest, blocked_bones, probe, rest_pose, skin_unmodified
+from .rig_probe import at_rest, blocked_bones, posed_bones, probe, rest_pose, skin_unmodified
 from .rigify_ik import ik_keys
 from .timing import current_frame_kept, show_frame
 from .transaction import all_or_nothing
@@ -226,6 +226,7 @@ def retarget(
             warnings = map_notices(rig, bone_map)
             warnings += blocked_bones(rig, keys, motion.rotations, motion.heads)
             keys += ik_keys(rig, keys)
+        warnings += posed_bones(rig, skeleton.names)
         former = rig.animation_data.action if rig.animation_data else None
         action = write_action(rig, keys, frames, source.name)
         if face is not None:

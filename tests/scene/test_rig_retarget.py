@@ -4,6 +4,7 @@
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.retarget.bone_map import BoneMap
 from scope.scope_addon.scene.export.export import ExportOptions
@@ -308,6 +309,40 @@ def test_bones_blocked_by_a_constraint_are_reported(source):
     constraint.mute = True
     assert run(source, rig).warnings == []
     assert direction_error(rig, bone_of, ARMS, JOINTS) < 1.0
+
+
+def _turned(bone):
+    bone.rotation_mode = "XYZ"
+    bone.rotation_euler.y = 0.5
+
+
+def _scaled(bone):
+    bone.scale = (0.5, 0.5, 0.5)
+
+
+@pytest.mark.parametrize("pose", [_turned, _scaled, _in_the_nla, None])
+def test_a_bone_that_carries_the_rig_and_is_posed_is_reported(source, pose):
+    """As the control of a whole rig is, which is not in the list and keeps its pose."""
+    rig, bone_of = build_rig("unreal")
+    bpy.ops.object.mode_set(mode="EDIT")
+    master = rig.data.edit_bones.new("Master")
+    master.tail = (0.0, 0.0, 0.2)
+    rig.data.edit_bones[bone_of["pelvis"]].parent = master
+    ponytail = rig.data.edit_bones.new("Ponytail")
+    ponytail.tail = (0.0, 0.2, 0.0)
+    ponytail.parent = rig.data.edit_bones[bone_of["head"]]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    _scaled(rig.pose.bones["Ponytail"])  # which carries nothing
+    if pose is not None:
+        pose(rig.pose.bones["Master"])
+        if pose is _in_the_nla:
+            rig.pose.bones["Master"].matrix_basis = Matrix()
+    warnings = run(source, rig).warnings
+    assert [w.values["bones"] for w in warnings] == [["Master"]] * (pose is not None)
+    if pose is None:
+        assert direction_error(rig, bone_of, ARMS, JOINTS) < 1.0
+    elif pose is _turned:  # so that it is said for a reason
+        assert direction_error(rig, bone_of, ARMS, JOINTS) > 10.0
 
 
 @pytest.mark.parametrize("part", ["left_knee", "pelvis"])
