@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Networks that loop for ever."""
+"""Networks that loop for ever, or take much memory."""
 
 from __future__ import annotations
 
@@ -44,3 +44,15 @@ def looping(path: Path, *, while_bright: bool = False) -> Path:
     return save(
         path, nodes, [picture_input(32, 32)], [out], {"longest": LONGEST, "threshold": threshold}
     )
+
+
+def greedy(path: Path) -> Path:
+    """Write a network that takes a quarter of a gigabyte for every image."""
+    nodes = [
+        helper.make_node("ConstantOfShape", ["shape"], ["much"]),
+        helper.make_node("ReduceMax", ["much"], ["zero"]),
+        helper.make_node("Add", ["images", "zero"], ["out"]),
+    ]
+    out = helper.make_tensor_value_info("out", TensorProto.FLOAT, [1, 3, 32, 32])
+    shape = np.array([1, 1, 1, 1 << 26], np.int64)
+    return save(path, nodes, [picture_input(32, 32)], [out], {"shape": shape})

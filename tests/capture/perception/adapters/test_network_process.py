@@ -35,7 +35,7 @@ from scope.solver.errors import ModelFileError
 
 from ....job.processes import runs, wait_for
 from ...small_graphs import simcc
-from .made_networks import looping
+from .made_networks import greedy, looping
 
 
 def grey(network: NetworkProcess) -> list[np.ndarray]:
@@ -51,6 +51,17 @@ def test_a_loop_that_only_some_images_start_ends_as_well(
     with pytest.raises(ModelFileError, match=r"no result within 0\.5 s"):
         network.run(None, {"images": np.full((1, 3, 32, 32), 2000, np.float32)})
     with pytest.raises(RuntimeError, match="its process has ended"):
+        grey(network)
+
+
+def test_a_network_that_takes_more_memory_than_it_may_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    network = NetworkProcess("cpu", greedy(tmp_path / "m.onnx"), 1)
+    assert grey(network)[0].shape == (1, 3, 32, 32)
+    monkeypatch.setattr(graph, "BASE_BYTES", 300_000_000)
+    network = NetworkProcess("cpu", greedy(tmp_path / "m.onnx"), 1)
+    with pytest.raises((ModelFileError, RuntimeError), match="memory"):
         grey(network)
 
 
