@@ -353,7 +353,8 @@ def _moved_on(corrections: tuple[Correction, ...], new: Upright | Floor) -> tupl
     """Add what moves the present world: W' = N W, kept as W' = F' U' of a floor and an upright
     line.
 
-    What is upright by a line is not levelled by the feet any more.
+    The transform of an upright line contains how the feet have levelled the motion before, see
+    `edit.upright`, so they do not do so any more.
     """
     floor = _only(corrections, Floor)
     upright = _only(corrections, Upright)

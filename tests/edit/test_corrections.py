@@ -142,7 +142,7 @@ def test_without_the_corrected_floor_feet_are_put_on_the_captured_one():
     assert removed(ALL, (Upright,)) == (*ALL[:8], *ALL[9:])
 
 
-def test_an_upright_line_replaces_what_was_levelled():
+def test_an_upright_line_contains_what_was_levelled():
     line = Upright.of(np.eye(4))
     assert added((FeetOnFloor(level=True, lift=False),), line) == (
         FeetOnFloor(level=False, lift=False),

@@ -6,15 +6,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import clip_from_motion
-from scope.scope_addon.edit.corrected_motion import shot_of, with_corrections
-from scope.scope_addon.edit.corrections import Contact, DepthFlip, Pin, Upright
+from scope.scope_addon.edit.corrected_motion import corrections_of, shot_of, with_corrections
+from scope.scope_addon.edit.corrections import (
+    Contact,
+    DepthFlip,
+    FeetOnFloor,
+    Pin,
+    Upright,
+    added,
+)
 from scope.scope_addon.edit.edits import moved_motion
 from scope.scope_addon.edit.upright import upright_transform, upright_transform_in_view
 from scope.scope_addon.errors import UsageError
 from scope.solver.rotations import exp
 
 from ..made_motion import rows_of
-from .walking import BODY, NAMES, motion_of, walk
+from .walking import BETAS, BODY, NAMES, motion_of, walk
 
 TRUTH = motion_of(walk(2.0), noise=0.02)
 ANKLE = NAMES.index("left_ankle")
@@ -69,6 +76,33 @@ def test_feet_and_pins_are_on_the_floor_of_the_world_that_a_line_has_turned():
     )
     expected = with_corrections(truth, BODY, (in_truth, stands))
     np.testing.assert_allclose(joints_of(fixed), joints_of(expected), atol=1e-3)
+
+
+@pytest.mark.parametrize("in_image", [True, False])
+def test_a_line_is_added_to_the_levelling_by_the_feet(in_image):
+    """A post in the image shows the tilt across the line of sight, and feet have shown the other
+    one before. In a view from the side, somebody whom they have levelled is upright already.
+    """
+    walker = walk(6.0, speed=0.2)  # so slow that a foot which is down counts as standing
+    walker.root[:, 0] = 0.4 * np.sin(0.5 * walker.times)
+    walker.root[:, 2] -= walker.soles(BODY, BETAS)[..., 2].min(axis=1)
+    truth = motion_of(walker)
+    tilt = np.eye(4)
+    tilt[:3, :3] = exp(np.array([0.1, 0.05, 0.0]))
+    levelled = with_corrections(moved_motion(truth, BODY, tilt), BODY, (FeetOnFloor(level=True),))
+    if in_image:
+        line = tuple(tuple(shot_of(truth).project(20, point)) for point in POST)
+        transform = upright_transform(levelled, BODY, 20, line)
+    else:
+        line = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        transform = upright_transform_in_view(levelled, BODY, line, np.array([0.0, 1.0, 0.0]))
+    corrections = added(corrections_of(levelled), Upright.of(transform))
+    fixed = with_corrections(levelled, BODY, corrections)
+    up = fixed.world_from_camera[20, :3, :3] @ truth.world_from_camera[20, :3, :3].T
+    assert np.degrees(np.arccos(tilt[2, 2])) > 6.0
+    assert np.degrees(np.arccos(up[2, 2])) < 1.5
+    heights = joints_of(fixed)[..., 2] - joints_of(truth)[..., 2]
+    assert np.abs(heights).max() < 0.05
 
 
 def test_somebody_turned_around_stands_upright_in_the_world_that_a_line_has_turned():
