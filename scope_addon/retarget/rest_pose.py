@@ -36,6 +36,9 @@ _MAX_SEGMENT_RATIO = 4.0
 _MAX_SIDE_RATIO = 1.5
 # Of the line from the hips to the head, from the vertical.
 _MAX_LEAN = np.radians(50)
+# Hips that are less than this share of their legs' length above the ankles sit or squat: the motion
+# would be lowered by as much. Digitigrade legs stand at nine tenths.
+_MIN_STANDING = 0.65
 
 
 @dataclass(frozen=True)
@@ -230,6 +233,17 @@ def rest_faults(heads: Mapping[str, Float64Array]) -> list[Fault]:
         up = heads["head"] - (hips[0] + hips[1]) / 2
         if up[2] < np.cos(_MAX_LEAN) * np.linalg.norm(up):
             faults.append(Fault(("head", "left_hip", "right_hip"), "lying"))
+            return faults
+    legs = [key for key in lengths if key[1:] == ("hip", "knee")]
+    bent = [
+        f"{side}_{part}"
+        for side, hip, knee in legs
+        for part in (hip, knee)
+        if heads[f"{side}_hip"][2] - heads[f"{side}_ankle"][2]
+        < _MIN_STANDING * (lengths[side, hip, knee] + lengths[side, knee, "ankle"])
+    ]
+    if bent and not faults:
+        faults.append(Fault(tuple(bent), "lying"))
     return faults
 
 

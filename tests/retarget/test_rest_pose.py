@@ -41,6 +41,12 @@ def standing(**moved: tuple[float, float, float]) -> dict[str, np.ndarray]:
     return {part: np.array(at, float) for part, at in (heads | moved).items()}
 
 
+def legs(**places: tuple[float, float]) -> dict[str, tuple[float, float, float]]:
+    """Return parts of both legs at places (y, z)."""
+    sides = (("left", 0.1), ("right", -0.1))
+    return {f"{side}_{part}": (x, *at) for side, x in sides for part, at in places.items()}
+
+
 @pytest.mark.parametrize(
     ("moved", "reasons"),
     [
@@ -49,6 +55,8 @@ def standing(**moved: tuple[float, float, float]) -> dict[str, np.ndarray]:
         ({"left_wrist": (2.0, 0.0, 1.4)}, ["segments", "sides"]),
         ({"left_ankle": (0.1, 0.0, 1.0)}, ["upwards"]),
         ({"head": (0.0, 1.6, 0.9)}, ["lying"]),
+        (legs(knee=(-0.4, 0.9), ankle=(-0.4, 0.5)), ["lying"]),  # sitting
+        (legs(knee=(-0.2, 0.55), ankle=(0.05, 0.1)), []),  # as animals that walk on their toes
     ],
 )
 def test_parts_that_cannot_be_right_are_found(moved, reasons) -> None:
