@@ -28,6 +28,7 @@ from ..retarget.skeleton import BoneMotion, Skeleton
 from .actions import assign_action, bone_path, fcurves_of, nla_strips, used_slot
 from .character.root_object import root_object, topmost
 from .datablocks import changed, is_deformed_by, modifiers_off
+from .rig_action import channel_of_rotation
 from .visibility import evaluated
 
 # Rigify's properties: limbs by FK, neck and head with the chest.
@@ -263,8 +264,19 @@ def blocked_bones(
         shift = max(shift, np.linalg.norm(seen[root, :3, 3] - heads[t]) / size)
     is_blocked = off > _MAX_DEVIATION
     is_blocked[root] |= shift > _MAX_SHIFT
+    is_blocked |= np.array([_is_driven(rig, key) for key in keys])
     blocked = [name for name, blocks in zip(names, is_blocked, strict=True) if blocks]
     return [notice("blocked_bones", bones=blocked, rig=rig.name)] if blocked else []
+
+
+def _is_driven(rig: bpy.types.Object, key: BoneMotion) -> bool:
+    """Return whether drivers replace keys of a bone, whatever they make of them at this frame."""
+    drivers = rig.animation_data.drivers if rig.animation_data else ()
+    mode = rig.pose.bones[key.bone].rotation_mode
+    paths = [bone_path(key.bone, channel_of_rotation(mode, np.eye(3)[None])[0])]
+    if key.locations is not None:
+        paths.append(bone_path(key.bone, "location"))
+    return any(driver.data_path in paths and not driver.mute for driver in drivers)
 
 
 def posed_bones(rig: bpy.types.Object, names: Sequence[str]) -> list[Notice]:

@@ -311,6 +311,22 @@ def test_bones_blocked_by_a_constraint_are_reported(source):
     assert direction_error(rig, bone_of, ARMS, JOINTS) < 1.0
 
 
+@pytest.mark.parametrize("channel", ["rotation_euler", "rotation_quaternion"])
+def test_a_bone_that_a_driver_turns_is_reported(source, channel):
+    """A little in the shown frame, and farther later; a driver of a channel that is not in use
+    does nothing.
+    """
+    rig, bone_of = build_rig("unreal")
+    hand = rig.pose.bones[bone_of["left_wrist"]]
+    hand.rotation_mode = "XYZ"
+    driver = hand.driver_add(channel, 2)
+    driver.driver.expression = "frame * 0.01"
+    blocked = [w.values["bones"] for w in run(source, rig).warnings]
+    assert blocked == ([[hand.name]] if channel == "rotation_euler" else [])
+    driver.mute = True
+    assert run(source, rig).warnings == []
+
+
 def _turned(bone):
     bone.rotation_mode = "XYZ"
     bone.rotation_euler.y = 0.5
