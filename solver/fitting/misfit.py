@@ -25,7 +25,6 @@ from ..options import Priors
 from ..part import Array
 from ..state import Fit, Status
 from ..tree import Tree
-from ..validation import LARGEST_STEP
 
 _FEWEST_POINTS = 4  # that are no coincidence
 _MANY_ITERATIONS = 40  # after which a fit that has not converged is judged as well
@@ -146,12 +145,12 @@ def warn_of_wrong_points(tree: Tree, measurements: Measurements, found: Fit) -> 
     if seen.sigma_m is not None:
         stated = float(np.median(np.asarray(seen.sigma_m, dtype=float)))
         most = min(_FAR_M, max(_FAR_M_IF_STATED, _FAR_SIGMAS * stated))
-    is_far = most < off < LARGEST_STEP  # beyond, another warning tells of the unit
+    is_far = off > most
     if is_far:
         warnings.warn(
             f"The body fits the 3D keypoints badly, by {off:.2f} m in the median; check "
-            "that each has its own point, by name or by number (joint i is M + i), and that the "
-            "intrinsics belong to pixels of this size.",
+            "that each has its own point, by name or by number (joint i is M + i), that the "
+            "intrinsics belong to pixels of this size, and residuals of your own are in metres.",
             ScopeWarning,
             stacklevel=3,
         )
@@ -179,7 +178,8 @@ def warn_of_wrong_pixels(tree: Tree, measurements: Measurements, found: Fit) -> 
         warnings.warn(
             f"The body fits the 2D keypoints badly, by {off:.0f} pixels in the median; check that "
             "each has its own point, by name or by number, that the intrinsics belong to pixels of "
-            "this size, and that other measurements are of the same person and time.",
+            "this size, and that other measurements are of the same person and time, and residuals "
+            "of your own in metres.",
             ScopeWarning,
             stacklevel=3,
         )

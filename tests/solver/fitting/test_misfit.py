@@ -19,6 +19,7 @@ from scope.solver import (
     ScopeWarning,
     rotations,
 )
+from scope.solver.residuals import external
 
 WIDTH = 2.0 * CAMERA[0, 2]
 PEOPLE = 3
@@ -148,6 +149,29 @@ def test_people_who_lie_or_stand_on_the_head_are_no_mistake(turns):
             solver.fit(body, only_3d(each))
             solver.fit(body, without_deviations(each))
         solver.fit_batch(body, [replace(each, keypoints3d=None) for each in seen])
+
+
+def test_a_residual_of_ones_own_in_millimetres_is_told(monkeypatch):
+    """It draws the body half a kilometre away from all that was seen."""
+    monkeypatch.setattr(external, "_external", {})
+    body, everyone = people()
+    hand = body.joint_names.index("left_hand")
+    solver.register_residual(
+        "height",
+        function=lambda part, ints, floats: floats[1:] ** 0.5 * (part.t[1:2] - floats[0]),
+        ints=1,
+        floats=2,
+        indexes="parts",
+    )
+    person = everyone[0]
+
+    def fit(height):
+        rows = {"height": ([[hand]], [[height, 1e5]])}
+        return solver.fit(body, replace(only_3d(person.seen), tables=rows))
+
+    fit(person.joints[hand, 1])
+    with pytest.warns(ScopeWarning, match="residuals of your own are in metres"):
+        fit(1000.0 * person.joints[hand, 1])
 
 
 def test_noise_that_is_larger_than_stated_is_no_mirror():
