@@ -161,7 +161,7 @@ class SCOPE_OT_export(SavingOperator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask for the file."""
-        self.filepath = str(_proposed(context, self.suffix()))
+        self.filepath = str(_beside_nobody(_proposed(context, self.suffix())))
         self.filter_glob = f"*{self.suffix()}"
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
@@ -331,6 +331,17 @@ def unused_path(folder: Path, capture: bpy.types.Collection, kind: str) -> Itera
     finally:
         for lock in held:
             release(lock)
+
+
+def _beside_nobody(path: Path) -> Path:
+    """Return a path, with a number where there are files of several people of its name: the file
+    browser asks before it replaces a file of the name itself, but not before those.
+    """
+    for number in itertools.count(1):
+        other = path if number == 1 else path.with_stem(f"{path.stem}_{number}")
+        if files_of_people(other) in ([], [other]):
+            break
+    return other
 
 
 def _is_taken(path: Path) -> bool:

@@ -4,6 +4,9 @@
 import os
 import sys
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import bpy
 import pytest
@@ -12,9 +15,10 @@ from scope.scope_addon.capture_report import Report
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.build import BuildOptions
 from scope.scope_addon.scene.visibility import hide
+from scope.scope_addon.ui import export_operators
 from scope.scope_addon.ui.capture_job import build_capture
 from scope.scope_addon.ui.captured_person import PERSON, captured_armature
-from scope.scope_addon.ui.export_operators import unused_path
+from scope.scope_addon.ui.export_operators import SCOPE_OT_export, unused_path
 from scope.scope_addon.ui.live_job import live_rig
 from scope.solver.body_file import load_body
 
@@ -124,6 +128,26 @@ def test_files_of_an_earlier_number_of_people_stay_and_are_named(
     assert f"not part of this result: {names}; remove" in capfd.readouterr().out
     for number in left:
         assert (tmp_path / f"walk.person{number}.bvh").read_text("utf-8") == "earlier"
+
+
+def test_no_name_is_proposed_of_which_there_are_files_of_several_people(tmp_path, monkeypatch):
+    """The file browser does not ask before they are replaced."""
+    capture = captured_with(motion_of(walk(0.1))).users_collection[0]
+    capture.name = "walk"
+    bpy.context.scene.scope.capture = capture
+    monkeypatch.setattr(export_operators.Path, "home", lambda: tmp_path)
+    operator = SimpleNamespace(suffix=lambda: ".npz")
+    context = MagicMock(scene=bpy.context.scene)
+
+    def proposed():
+        SCOPE_OT_export.invoke(operator, context, None)
+        return Path(operator.filepath).name
+
+    assert proposed() == "walk.npz"
+    (tmp_path / "walk.npz").write_text("earlier")
+    assert proposed() == "walk.npz"  # of which the browser asks
+    (tmp_path / "walk.person1.npz").write_text("earlier")
+    assert proposed() == "walk_2.npz"
 
 
 def test_two_blenders_that_write_files_of_lists_to_one_folder_take_different_names(tmp_path):
