@@ -228,6 +228,7 @@ def people_of(
     for tracklet in tracklets:
         tracklet.truncate(frames_before_flicker(tracklet, times))
         tracklet.truncate(frames_before_merger(tracklet, tracklets, times))
+    tracklets = without_glimpses(tracklets, times)
     found = [[tracklets[k] for k in chain] for chain in link(tracklets, times)]
     counted = _plausible(found, times)
     prominence = [_prominence(person, times) for person in counted]
@@ -363,6 +364,28 @@ def frames_before_flicker(tracklet: Tracklet, times: Sequence[float]) -> int:
             break
         end = start
     return end
+
+
+def without_glimpses(tracklets: Sequence[Tracklet], times: Sequence[float]) -> list[Tracklet]:
+    """Leave out tracklets that are too short to be plausible, unless others continue them, as where
+    somebody moves too fast to be followed; all of them stay where there are no others.
+
+    As the beginning of somebody who is found later, such a glimpse of another person would put the
+    first one there.
+    """
+    begins = {tracklet.rows[0] for tracklet in tracklets if tracklet.rows}
+    ends = {tracklet.rows[-1] for tracklet in tracklets if tracklet.rows}
+    step_s = float(np.median(np.diff(times))) if len(times) > 1 else MIN_REAPPEARANCE_S
+    kept = []
+    for tracklet in tracklets:
+        if not tracklet.rows:
+            continue
+        first, last = tracklet.rows[0], tracklet.rows[-1]
+        seconds = times[last] - times[first] + step_s
+        is_continued = last + 1 in begins or first - 1 in ends
+        if is_continued or seconds > MIN_REAPPEARANCE_S - 0.5 * step_s:
+            kept.append(tracklet)
+    return kept or list(tracklets)
 
 
 def _prominence(person: list[Tracklet], times: Sequence[float]) -> float:

@@ -323,6 +323,22 @@ def test_who_is_seen_for_three_seconds_beside_the_main_person_is_kept(
     assert doubtful == ([] if is_person else [passes])
 
 
+@pytest.mark.parametrize(("glimpse", "counts"), [(1, False), (2, False), (3, True)])
+def test_a_glimpse_is_not_where_somebody_was_who_is_found_later(glimpse: int, counts: bool) -> None:
+    """At 30 frames per second, three of them may be somebody; fewer only where others continue
+    them, or are all that there is.
+    """
+    times = (np.arange(60) / FPS).tolist()
+    tracklets = [seen_at([450.0] * glimpse, 2), seen_at([300.0] * 36, 24)]
+    (person, *_), _ = people_of(times, tracklets)
+    assert (person[0].centers_px[0][0] == 450.0) == counts
+    continued = [seen_at([300.0] * glimpse, 24 - glimpse), seen_at([310.0] * 36, 24)]
+    (person, *_), _ = people_of(times, continued)
+    assert sum(len(tracklet.rows) for tracklet in person) == 36 + glimpse
+    (person,), _ = people_of(times[:glimpse], [seen_at([300.0] * glimpse)])
+    assert len(person[0].rows) == glimpse
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("networks")
 def test_identities_of_real_people_are_not_switched_where_they_cross(shared: Path) -> None:
