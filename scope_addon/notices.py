@@ -215,6 +215,7 @@ SENTENCES = {
     "arrays_left_out": "these arrays of the file do not hold one rotation for each frame, and were "
     "left out: {arrays:names}",
     "rate_not_stated": "the file states no frame rate; {rate:g} frames per second were assumed",
+    "rate_stated": "the file states {stated:g} frames per second, which were used, not {given:g}",
     "no_translation": "the file holds no translation: the pelvis stays in place",
     "unsure_up": "the file's up axis is not clear from the motion; {axis} was assumed",
     "other_skeleton": "limbs have the directions of the file's skeleton, but the body keeps its "

@@ -75,9 +75,14 @@ def import_motions(
         own = Motion.load(path)
         chosen = own.body_model if body == "scope" else body
         if body != "scope" or chosen in BUILT_IN:
-            return [_own(own, load_body(chosen), path)]
+            if up not in ("auto", "z"):
+                raise UsageError(
+                    f"{path} was written by Scope, with z up: leave out --up, in Blender set Up to "
+                    "Automatic"
+                )
+            return [_own(own, load_body(chosen), path, rate)]
     if path.suffix.lower() == ".bvh":
-        return _from_bvh(path, body, up)
+        return _from_bvh(path, body, up, rate)
     sources = read_smpl_motions(path)
     built_in = (
         sources[0].body_model
@@ -98,7 +103,14 @@ def import_motions(
     return [convert(source, loaded, path, up, rate, begin) for source in sources]
 
 
-def _own(motion: Motion, body: Body, path: Path) -> Imported:
+def _ignored_rate(stated: float | None, given: float) -> list[Notice]:
+    """Say that the frame rate of a file was used instead of another one that was given, 0: none."""
+    if stated is None or not given or np.isclose(given, stated, rtol=1e-3):
+        return []
+    return [notice("rate_stated", stated=stated, given=given)]
+
+
+def _own(motion: Motion, body: Body, path: Path, rate: float) -> Imported:
     motion.check_body(body, str(path))
     for each in fields(motion):
         value = getattr(motion, each.name)
@@ -121,7 +133,7 @@ def _own(motion: Motion, body: Body, path: Path) -> Imported:
             f"{path}: its frame rate or timestamps cannot be used; choose another file"
         )
     _check_size(body, motion.betas, path)
-    return Imported(motion, body)
+    return Imported(motion, body, _ignored_rate(motion.mocap_framerate, rate))
 
 
 def _check_size(body: Body, betas: FloatArray, path: Path) -> None:
@@ -136,7 +148,7 @@ def _check_size(body: Body, betas: FloatArray, path: Path) -> None:
         )
 
 
-def _from_bvh(path: Path, body: str, up: str) -> list[Imported]:
+def _from_bvh(path: Path, body: str, up: str, given_rate: float) -> list[Imported]:
     """Put the people of a BVH file on a body; each stands on the floor."""
     performers = find_performers(read_bvh(path, MotionFileError), path, up)
     fingers = {*HAND_JOINTS["left"], *HAND_JOINTS["right"]}
@@ -148,6 +160,7 @@ def _from_bvh(path: Path, body: str, up: str) -> list[Imported]:
     for performer in performers:
         poses, root, notes = performer.on_body(loaded, path)
         rate = performer.file.rate
+        notes = [*notes, *_ignored_rate(rate, given_rate)]
         contact, floor = _standing(loaded, betas, poses, root, np.arange(len(root)) / rate)
         trans = root - [0.0, 0.0, floor] - loaded.rest_joints(betas)[0]
         motion = _motion(loaded, betas, poses, trans, contact, rate)
@@ -199,6 +212,7 @@ def convert(
     frames_per_second = source.rate or rate or DEFAULT_RATE
     if source.rate is None and not rate:
         notes.append(notice("rate_not_stated", rate=DEFAULT_RATE))
+    notes += _ignored_rate(source.rate, rate)
     if source.trans is None:
         notes.append(notice("no_translation"))
     trans = np.zeros((len(source), 3)) if source.trans is None else source.trans

@@ -134,3 +134,11 @@ def test_the_time_to_read_grows_with_the_size_alone(tmp_path):
     chain = f"HIERARCHY\nROOT a {{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n{joint * depth}"
     with pytest.raises(MotionFileError, match=r"they are a, a\.1, a\.2"):
         imported(tmp_path, chain + "}" * (depth + 1) + "\nMOTION\nFrames: 1\nFrame Time: 0.1\n0\n")
+
+
+def test_another_rate_than_the_file_states_is_said_to_be_ignored(tmp_path):
+    found = imported(tmp_path, WHOLE, rate=12.0)
+    assert found.motion.mocap_framerate == pytest.approx(30.0, rel=1e-3)
+    assert [note.code for note in found.notes].count("rate_stated") == 1
+    found = imported(tmp_path, WHOLE, rate=30.0)
+    assert "rate_stated" not in [note.code for note in found.notes]

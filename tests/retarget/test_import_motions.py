@@ -201,6 +201,24 @@ def test_people_whom_a_tracker_saw_at_other_times_begin_then(tmp_path):
     np.testing.assert_allclose(second.timestamps, late / RATE)
 
 
+def test_another_rate_than_the_file_states_is_said_to_be_ignored(tmp_path):
+    np.savez(tmp_path / "other.npz", **in_file("z"))
+    (tmp_path / "own.npz").write_bytes(MOTION.to_bytes())
+    for name in ("other.npz", "own.npz"):
+        for rate in (12.0, RATE):
+            found = import_motion(tmp_path / name, rate=rate)
+            assert found.motion.mocap_framerate == RATE
+            codes = [note.code for note in found.notes if note.code == "rate_stated"]
+            assert len(codes) == (rate != RATE)
+
+
+def test_another_up_axis_of_our_own_file_is_refused(tmp_path):
+    (tmp_path / "own.npz").write_bytes(MOTION.to_bytes())
+    assert import_motion(tmp_path / "own.npz", up="z").notes == []
+    with pytest.raises(UsageError, match=r"own.npz was written by Scope, with z up"):
+        import_motion(tmp_path / "own.npz", up="y")
+
+
 @pytest.mark.parametrize("arguments", [{"up": "x"}, {"rate": np.nan}])
 def test_invalid_arguments(tmp_path, arguments):
     np.savez(tmp_path / "walk.npz", **in_file("z"))
