@@ -196,6 +196,8 @@ SENTENCES = {
     "blocked_bones": "these bones of '{rig}' cannot follow the motion: {bones:names}; mute the "
     "constraints or drivers that control them, such as IK, or put the bones that control them "
     "into the list",
+    "stretched_rig": "'{rig}' has another scale along each axis, which turns its limbs away from "
+    "the captured ones: apply the scale of the rig and its meshes (Ctrl A), or scale it evenly",
     "posed_bones": "the pose of these bones of '{rig}', which are not in the list, moves or turns "
     "the motion: {bones:names}; clear it in Pose Mode (Alt G, Alt R, Alt S) for the motion as "
     "captured",

@@ -101,10 +101,6 @@ def _check_carried(
         above = f"{side}_{_CARRIED_BY[kind]}" if kind in _CARRIED_BY else "pelvis"
         if kind not in (*_CARRIED_BY, "hip", "shoulder") or above not in bone_of:
             continue
-        # Under a scale of three factors, what the probe sees is sheared.
-        ancestors = rig.data.bones[names[bone]].parent_recursive
-        if rig.data.bones[names[bone_of[above]]] in ancestors:
-            continue
         carrying = bone
         while carrying >= 0 and carrying != bone_of[above]:
             carrying = int(carriers[carrying])
@@ -119,13 +115,15 @@ def _check_carried(
 def _dependencies(
     rig: bpy.types.Object, parts: dict[str, str], rest: NDArray[np.float64]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Rotate each bone and observe the others.
+    """Rotate each bone and observe the others, in the armature's space: the object may shear them.
 
     :param rest: (B, 4, 4) bones to world at rest.
     :return: (B, B) whether the row's bone rotates with the column's, and whether its head moves
         with it.
     """
     names = list(parts)
+    armature_from_world = np.linalg.inv(np.array(rig.matrix_world, float))
+    rest = armature_from_world @ rest
     follows = np.zeros((len(names), len(names)), bool)
     carried = follows.copy()
     heads = rest[:, :3, 3]
@@ -134,7 +132,7 @@ def _dependencies(
         for k, a in enumerate(group):
             turn = Quaternion((0.6, 0.48, 0.64), 0.5 + 0.15 * k)
             rig.pose.bones[names[a]].matrix_basis = turn.to_matrix().to_4x4()
-        posed = _matrices(rig, names)
+        posed = armature_from_world @ _matrices(rig, names)
         turned = _rotations(posed) @ np.swapaxes(_rotations(rest), 1, 2)
         _check_rotated(rig, [names[a] for a in group], turned[group])
         for a in group:

@@ -59,6 +59,8 @@ _EXPECTED = ("head", "left_shoulder", "left_elbow", "right_shoulder", "right_elb
 # Largest difference from the identity of the rotations of fingers that were not captured, which
 # single precision leaves.
 _AT_REST = 1e-5
+# of an object's largest scale from its smallest; limbs are then up to 4 degrees off
+_MAX_STRETCH = 1.05
 # share of a rig's volume below which a frame counts as one that does not show the rig
 _HIDDEN_VOLUME = 1e-12
 
@@ -143,6 +145,9 @@ def map_notices(rig: bpy.types.Object, bone_map: BoneMap) -> list[Notice]:
     still += [part for part in _EXPECTED if part not in parts]
     if still:
         notices.append(notice("still_parts", rig=rig.name, parts=still))
+    scales = np.linalg.svd(np.array(rig.matrix_world.to_3x3(), float), compute_uv=False)
+    if scales[0] > _MAX_STRETCH * scales[-1]:
+        notices.append(notice("stretched_rig", rig=rig.name))
     for fault in rest_faults(_heads_at_rest(rig, bone_map)):
         bones = [bone_map.bone(part) or part for part in fault.parts]
         notices.append(notice("odd_bones", rig=rig.name, bones=bones, reason=fault.reason))
