@@ -70,7 +70,9 @@ class StreamSource(Source):
             if stream.average_rate and 1 <= stream.average_rate <= 240:
                 self.fps = Fraction(stream.average_rate)
             is_fetched = _is_fetched(container)
+            has_times = not container.format.flags & _NO_TIMESTAMPS
             playback = Playback(clock)
+            sent = SentTimes()
             last_s = -np.inf
             try:
                 index = 0
@@ -79,14 +81,15 @@ class StreamSource(Source):
                         yield None
                         continue
                     image_rgb = self._image(frame, float(stream.sample_aspect_ratio or 1))
-                    due_s = clock.now()
+                    arrived_s = clock.now()
+                    filmed_s = sent.at(frame.time if has_times else None, arrived_s)
                     # what is sent while it is filmed comes when it is to be shown
                     if is_fetched and frame.time is not None:
                         if not 0.0 <= frame.time - last_s <= LEAP_S:  # another programme begins
                             playback = Playback(clock)
                         last_s = frame.time
-                        due_s = playback.wait(last_s)
-                    yield Picture(index, due_s, due_s, image_rgb)
+                        filmed_s = arrived_s = playback.wait(last_s)
+                    yield Picture(index, filmed_s, arrived_s, image_rgb)
                     index += 1
             except (av.error.FFmpegError, OSError, ValueError) as error:
                 raise VideoError(f"{self.name} was interrupted ({_reason(error)})") from error
@@ -169,6 +172,34 @@ class StreamSource(Source):
         """
         check_size(Path(self.name), frame.width, frame.height)
         return upright(Path(self.name), rgb(frame), aspect, *orientation(frame))
+
+
+class SentTimes:
+    """When the frames of a stream were filmed, by the clock and up to a constant: a relay sends
+    several at once, and a network delays some, which their own times do not show.
+
+    Times that go away from the clock by more than `KEY_FRAME_S`, as those of a sender that counts
+    them wrongly, are not used any more: what comes at once is hardly longer.
+    """
+
+    def __init__(self) -> None:
+        self._offset_s = 0.0  # of the clock
+        self._last_s = -np.inf
+        self._are_wrong = False
+
+    def at(self, time_s: float | None, arrived_s: float) -> float:
+        """Return when the next frame was filmed, or without usable times when it arrived.
+
+        :param time_s: its own time; None if it has none.
+        """
+        if time_s is None or self._are_wrong:
+            return arrived_s
+        if not 0.0 < time_s - self._last_s <= LEAP_S:  # another programme begins
+            self._offset_s = arrived_s - time_s
+        self._last_s = time_s
+        filmed_s = self._offset_s + time_s
+        self._are_wrong = abs(arrived_s - filmed_s) > KEY_FRAME_S
+        return arrived_s if self._are_wrong else filmed_s
 
 
 def _is_fetched(container: InputContainer) -> bool:

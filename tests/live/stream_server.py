@@ -38,6 +38,19 @@ def served(folder, name, data):
         yield f"http://127.0.0.1:{port}/{name}"
 
 
+@contextmanager
+def pushed(data):
+    """Send bytes to whoever connects, all at once; gives the address."""
+
+    class Handler(StreamRequestHandler):
+        def handle(self):
+            with suppress(OSError):
+                self.wfile.write(data)
+
+    with ThreadingTCPServer(("127.0.0.1", 0), Handler) as server, _running(server) as port:
+        yield f"tcp://127.0.0.1:{port}"
+
+
 def encoded(
     images,
     codec="mpeg2video",

@@ -15,11 +15,13 @@ from scope.scope_addon.live import source as live_source
 from scope.scope_addon.live.newest_frame import NewestFrame
 from scope.scope_addon.live.open_source import is_stream, open_source
 from scope.scope_addon.live.source import LEAP_S, Clock
+from scope.scope_addon.live.stream import SentTimes
 
 from .fake_source import FakeClock
 from .mjpeg_server import mjpeg_server
 from .stream_server import (
     encoded,
+    pushed,
     served,
     served_as_hls,
 )
@@ -188,6 +190,31 @@ def test_the_segments_of_a_playlist_are_read(tmp_path):
     # when they were filmed, though they come all at once
     times = np.array([picture.timestamp_s for picture in read])
     np.testing.assert_allclose(times - times[0], np.arange(36) / 30, atol=0.04)
+
+
+def test_frames_that_a_relay_sends_at_once_have_the_times_at_which_they_were_filmed():
+    """Their format has times; another one has none, so that they have those of their arrival."""
+    with pushed(encoded(moving(30), begins_s=70.0)) as address:
+        times = [picture.timestamp_s for picture in all_pictures(address)]
+    assert len(times) >= 28
+    np.testing.assert_allclose(np.diff(times), 1 / 30, atol=1e-3)
+    with pushed(encoded(moving(30), "mjpeg", "mjpeg")) as address:
+        read = all_pictures(address)
+    assert len(read) >= 28
+    assert all(picture.timestamp_s == picture.arrived_s for picture in read)
+
+
+def test_times_of_a_sender_are_used_as_long_as_they_can_be_true():
+    sent = SentTimes()
+    assert sent.at(100.0, 5.0) == 5.0
+    assert sent.at(100.04, 6.5) == pytest.approx(5.04)  # the network was late
+    assert sent.at(100.08, 6.5) == pytest.approx(5.08)
+    assert sent.at(3.0, 6.7) == pytest.approx(6.7)  # another programme
+    assert sent.at(3.04, 6.7) == pytest.approx(6.74)
+    assert sent.at(None, 7.0) == 7.0
+    slow = SentTimes()
+    times = [slow.at(0.02 * k, 0.04 * k) for k in range(1500)]  # it counts half a second as one
+    assert times[-1] == pytest.approx(0.04 * 1499)
 
 
 def test_another_programme_of_a_stream_is_shown_at_once(tmp_path):
