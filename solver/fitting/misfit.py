@@ -25,6 +25,7 @@ from ..options import Priors
 from ..part import Array
 from ..state import Fit, Status
 from ..tree import Tree
+from ..validation import LARGEST_STEP
 
 _FEWEST_POINTS = 4  # that are no coincidence
 _MANY_ITERATIONS = 40  # after which a fit that has not converged is judged as well
@@ -145,7 +146,8 @@ def warn_of_wrong_points(tree: Tree, measurements: Measurements, found: Fit) -> 
     if seen.sigma_m is not None:
         stated = float(np.median(np.asarray(seen.sigma_m, dtype=float)))
         most = min(_FAR_M, max(_FAR_M_IF_STATED, _FAR_SIGMAS * stated))
-    is_far = off > most
+    # beyond, another warning tells of the unit of points, but none of that of one's own residuals
+    is_far = most < off < (math.inf if measurements.tables else LARGEST_STEP)
     if is_far:
         warnings.warn(
             f"The body fits the 3D keypoints badly, by {off:.2f} m in the median; check "
