@@ -28,6 +28,8 @@ from .arrays import as_array, as_arrays, as_integers, described
 from .errors import InvalidValueError, ModelFileError, ShapeError
 from .part import Array
 
+_ROTATION_TOLERANCE = 0.03  # matrices rounded to two decimals are off by up to 0.02
+
 
 @dataclass(frozen=True)
 class Body:
@@ -193,8 +195,11 @@ class Body:
         :param betas: (P,); zeros if None.
         :return: R (..., K+1, 3, 3) and t (..., K+1, 3): part to target frame; t are the joints.
         :raises ShapeError: rotations, trans or betas have another shape.
+        :raises InvalidValueError: a matrix is no rotation. One that is not finite may stand for a
+            frame that is not known.
         """
         rotations = as_arrays(rotations, (self.K + 1, 3, 3), "rotations")
+        _check_rotations(rotations)
         trans = as_arrays(trans, (3,), "trans")
         if trans.shape[:-1] and trans.shape[:-1] != rotations.shape[:-3]:
             wanted = (*rotations.shape[:-3], 3)
@@ -278,6 +283,22 @@ class Body:
             np.int32, order="C"
         )
         return halves
+
+
+def _check_rotations(rotations: Array) -> None:
+    """Check matrices (..., 3, 3): two rows must be orthonormal, and the third their product. All
+    inner products and the determinant take several times as long.
+    """
+    first, second, third = np.moveaxis(rotations, -2, 0)
+    off = np.abs(np.cross(first, second) - third).max(axis=-1)
+    for a, b, product in ((first, first, 1.0), (second, second, 1.0), (first, second, 0.0)):
+        off = np.maximum(off, np.abs(np.einsum("...i,...i", a, b) - product))
+    wrong = np.argwhere(off > _ROTATION_TOLERANCE)
+    for at in wrong[:1]:
+        raise InvalidValueError(
+            "rotations must be rotation matrices, orthonormal and of determinant 1, but number "
+            f"{', '.join(map(str, at))} is {rotations[tuple(at)].tolist()}."
+        )
 
 
 def numbers_of(body: object) -> Mapping[str, int]:

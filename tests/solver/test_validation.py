@@ -32,6 +32,7 @@ from scope.solver import (
     fit_batch,
     fit_clip,
     fit_motion,
+    load_body,
     load_joint_prior,
     make_tree,
     rotations,
@@ -306,6 +307,28 @@ BODIES_REFUSED = {
 def test_bodies_that_cannot_be_used_are_refused(given, error, message):
     with pytest.raises(error, match=message):
         fit(given, SEEN, priors=Priors(), options=SHORT)
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        np.zeros((3, 3)),
+        MIRROR,
+        1.1 * np.eye(3),
+        np.diag([1.0, 1.2, 1.2]),
+        np.eye(3) + 0.1 * np.eye(3, k=1),
+        np.eye(3) + 0.1 * np.eye(3, k=-1),
+        np.eye(3) + 0.1 * np.eye(3, k=-2),
+    ],
+)
+def test_a_body_is_not_posed_by_matrices_that_are_no_rotations(matrix):
+    person = load_body()
+    turns = rotations.exp(np.random.default_rng(0).standard_normal((5, person.K + 1, 3))).round(2)
+    turns[3] = NAN  # a frame that is not known
+    person.forward_kinematics(turns, np.zeros(3))
+    turns[1, 7] = matrix @ turns[1, 7]
+    with pytest.raises(InvalidValueError, match="rotations must be .* but number 1, 7 is"):
+        person.forward_kinematics(turns, np.zeros(3))
 
 
 @pytest.mark.parametrize(
