@@ -360,7 +360,8 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
         else:
             observe_frames = lasting(unfinished.folder, args.windows_folder)
             result = capture(video, body, options, watched, observe_frames=observe_frames)
-        for each in (named, footage, *views):
+        named.check()
+        for each in (footage, *views):
             each.check()
         progress("writing", 0, 0)
         with interrupted("some results may have been written already, each of them complete"):
@@ -393,8 +394,8 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
                     footage.watched(lambda i, n: progress("report", i, n), to_end=True),
                 )
                 written.append(args.report)
-            for each in (named, footage):
-                each.check()
+            named.check()
+            footage.check()
             report = captured.as_json() | {"outputs": [str(path) for path in written]}
             if args.finished_file:
                 write_finished(args.finished_file, report)

@@ -146,8 +146,9 @@ def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
             else:
                 observe_frames = lasting(unfinished.folder)
                 result = capture(request.footage, body, options, progress, watch, observe_frames)
-        for watched in (named, *footage):
-            watched.check()
+        named.check()
+        for each in footage:
+            each.check()
         names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
         reporter.progress("writing", 0, 0)
         for name, motion in zip(names, result.motions, strict=True):
