@@ -50,7 +50,7 @@ def test_another_file_is_not_overwritten(tmp_path, content):
         (b"\xff\xfe{}", "it is not JSON"),
         (b"[" * 100_000, "it is not JSON"),
         (b'{"a": 1' + b"0" * 400 + b"}", "it has a number of 401 digits"),
-        (b" " * (LARGEST_JSON_BYTES + 1), "hero.json"),
+        (b"{}" + b" " * LARGEST_JSON_BYTES, "too large for a bone map"),
     ],
 )
 def test_what_is_no_object_is_refused_in_one_line(tmp_path, content, words):
