@@ -59,6 +59,7 @@ _EXPECTED = ("head", "left_shoulder", "left_elbow", "right_shoulder", "right_elb
 # Largest difference from the identity of the rotations of fingers that were not captured, which
 # single precision leaves.
 _AT_REST = 1e-5
+_SAME_SIZE = 1e-3  # of a rig whose parents change its size, as a share of it
 # of an object's largest scale from its smallest; limbs are then up to 4 degrees off
 _MAX_STRETCH = 1.05
 # share of a rig's volume below which a frame counts as one that does not show the rig
@@ -202,7 +203,11 @@ def retarget(
     with all_or_nothing(bpy.context.scene, rig, topmost(rig)), skin_unmodified(rig):
         places = _places(source, frames)
         back_above = _back_above_root_object(rig, frames)
-        with at_rest(rig):
+        with at_rest(rig), current_frame_kept(bpy.context.scene):
+            moved = _places(rig, frames)
+            if len(moved) > 1:
+                present = np.array(rig.matrix_world, float)
+                show_frame(bpy.context.scene, frames[_most_upright(moved, present)])
             skeleton = probe(rig, bone_map.parts)
             place = np.array(rig.matrix_world, float)
             root = skeleton.names.index(bone_map.bone("pelvis") or "")
@@ -222,7 +227,7 @@ def retarget(
             motion = _placed(places, apart, skeleton, place, pose, root, options)
             if options.root != "in-place":
                 motion = _moved_back(motion, _below(motion.trajectory, back_above))
-                motion = _moved_back(motion, _back(place, _places(rig, frames)))
+                motion = _moved_back(motion, _back(place, moved))
             turns = basis(skeleton, motion.rotations)
             keys = [BoneMotion(name, turns[:, b]) for b, name in enumerate(skeleton.names)]
             keys[root] = replace(
@@ -435,6 +440,20 @@ def _places(source: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np
             else:
                 places.append(empty.matrix_world @ empty.matrix_basis.inverted_safe())
     return np.array(places, float)
+
+
+def _most_upright(places: NDArray[np.float64], place: NDArray[np.float64]) -> int:
+    """Return the index of the place, of those where the rig has its present size, or the nearest to
+    it, in which one of the axes is nearest to the vertical: a boat or a horse that carries a rig tilts it, and the rig
+    is measured standing.
+
+    :param places: (T, 4, 4) from `_places`.
+    :param place: (4, 4) the present one.
+    """
+    R = np.array([Matrix(each.tolist()).to_quaternion().to_matrix() for each in places])
+    sizes = np.cbrt(np.abs(np.linalg.det(places)) / max(abs(np.linalg.det(place)), 1e-30))
+    apart = np.abs(sizes - 1.0)
+    return int(np.where(apart < _SAME_SIZE, np.abs(R[:, 2]).max(axis=1), -apart).argmax())
 
 
 def _is_carried(source: bpy.types.Object) -> bool:

@@ -66,6 +66,27 @@ def test_a_pelvis_without_local_location_is_where_one_with_it_is(source, has_par
     np.testing.assert_allclose(seen(rig, bone_of.values()), expected, atol=1e-4)
 
 
+@pytest.mark.parametrize("frame", [1, 25])
+@pytest.mark.parametrize("root", ["bone", "object"])
+def test_a_rig_on_a_boat_moves_alike_at_whichever_frame_it_is_retargeted(source, frame, root):
+    """The boat has a list of 20 degrees at first, and none at frame 25."""
+    rig, bone_of = build_rig("mixamo")
+    run(source, rig, root=root)
+    expected = seen(rig, bone_of.values())
+    bpy.data.objects.remove(rig)
+    bpy.ops.outliner.orphans_purge()
+    rig, bone_of = build_rig("mixamo")
+    boat = added_empty("boat")
+    for at, tilt in ((1, 0.35), (25, 0.0), (50, -0.2)):
+        boat.rotation_euler.x = tilt
+        boat.keyframe_insert("rotation_euler", frame=at)
+    rig.parent = boat
+    bpy.context.scene.frame_set(frame)
+    run(source, rig, root=root)
+    assert bpy.context.scene.frame_current == frame
+    np.testing.assert_allclose(seen(rig, bone_of.values()), expected, atol=1e-3)
+
+
 @pytest.mark.parametrize("matrix", [FBX, TURNED])
 def test_on_an_object_the_rig_looks_the_same(source, matrix):
     rig, bone_of = build_rig("mixamo", matrix=matrix)
