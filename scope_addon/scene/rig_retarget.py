@@ -444,8 +444,8 @@ def _places(source: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np
 
 def _most_upright(places: NDArray[np.float64], place: NDArray[np.float64]) -> int:
     """Return the index of the place, of those where the rig has its present size, or the nearest to
-    it, in which one of the axes is nearest to the vertical: a boat or a horse that carries a rig tilts it, and the rig
-    is measured standing.
+    it, in which one of the axes is nearest to the vertical: a boat or a horse that carries a rig
+    tilts it, and the rig is measured standing.
 
     :param places: (T, 4, 4) from `_places`.
     :param place: (4, 4) the present one.
