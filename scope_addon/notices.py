@@ -239,6 +239,8 @@ REASONS = {
     "swing": "a hand or foot swings through in depth: check these frames from the side",
     "lean": "leans farther than anybody can stand: check these frames from the side",
     "floating": "floats above the floor: check these frames",
+    "leap": "moves faster than anybody can: the footage may leave out what happened, or somebody "
+    "else is followed from there on",
 }
 _SEVERAL_FLOORS = (
     "the clip has more than one floor: capture the part that matters, with a start and end time, "

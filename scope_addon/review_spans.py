@@ -9,6 +9,8 @@ itself says nothing:
   image, as if it had been solved in front of the body and then behind it;
 - lean: the weight is held beside the feet for seconds, where anybody would fall;
 - floating: both feet are above the floor for longer than a jump takes;
+- leap: the body is elsewhere within a few frames, and slow before and after that, as where footage
+  leaves out what happened, or somebody else is followed;
 - bent knees: a person who stands or walks never straightens a knee in the whole clip.
 
 It may be true: of a punch, of somebody who is held or hangs, of a crouch.
@@ -38,6 +40,8 @@ LEAN_S = 2.0
 NOT_SITTING = 0.7  # height of the pelvis over two thighs, from which nobody sits
 FLOATING_M = 0.25  # of both ankles' height above that at which they stand
 FLOATING_S = 1.2  # a jump of 1.7 m
+LEAP_M_S = 8.0  # across the line of sight; in 40 captures without a leap, below 6
+LEAP_S = 0.3  # within which the body is less than half as fast before it, and after it
 BENT_KNEE_DEG = 155.0  # the straightest knee of a standing person
 STANDING = 0.85  # distance of hip and ankle over the leg's length, from which a person stands
 BENT_S = 3.0  # of standing, in which a knee is straight at some time
@@ -129,12 +133,13 @@ def implausible(motion: Motion) -> dict[str, BoolArray]:
     """
     never = np.zeros(len(motion), bool)
     if len(motion) < 2 or not motion.image_size.any():  # imported: no camera has seen it
-        return {"swing": never, "lean": never, "floating": never}
+        return {"swing": never, "lean": never, "floating": never, "leap": never}
     joints = joints_in_world(motion)
     return {
         "swing": _swings(motion) & motion.valid,
         "lean": _leans(motion, joints) & motion.valid,
         "floating": _floats(motion, joints) & motion.valid,
+        "leap": _leaps(motion, joints[:, _AT["pelvis"]]) & motion.valid,
     }
 
 
@@ -209,6 +214,27 @@ def _floats(motion: Motion, joints: Float64Array) -> BoolArray:
     above_feet = [k for name, k in _AT.items() if not name.endswith("foot")]
     lowest = joints[:, above_feet, 2].min(axis=1)
     return _held(motion, lowest > _ANKLE_M + FLOATING_M, FLOATING_S)
+
+
+def _leaps(motion: Motion, pelvis: Float64Array) -> BoolArray:
+    """Return the frames (T,) before and after a step of a leap.
+
+    :param pelvis: (T, 3) in the world, metres.
+    """
+    times = motion.times_with_gaps
+    sight = pelvis - motion.world_from_camera[:, :3, 3]
+    sight /= np.maximum(np.linalg.norm(sight, axis=1, keepdims=True), 1e-9)
+    steps = np.diff(pelvis, axis=0)
+    across = steps - (steps * sight[1:]).sum(axis=1, keepdims=True) * sight[1:]
+    speed = np.linalg.norm(across, axis=1) / np.diff(times)
+    is_seen = motion.valid[1:] & motion.valid[:-1]
+    found = np.zeros(len(motion), bool)
+    for k in np.flatnonzero((speed > LEAP_M_S) & is_seen):
+        before = speed[:k][times[k] - times[:k] <= LEAP_S]
+        after = speed[k + 1 :][times[k + 2 :] - times[k + 1] <= LEAP_S]
+        if all(len(others) and others.min() < 0.5 * speed[k] for others in (before, after)):
+            found[k : k + 2] = True
+    return found
 
 
 def _distance(point: Float64Array, a: Float64Array, b: Float64Array) -> Float64Array:

@@ -146,3 +146,21 @@ def test_bent_knees_are_said_of_who_stands_in_most_of_the_frames_that_show_them(
 def test_an_imported_motion_which_no_camera_has_seen_is_not_judged() -> None:
     imported = replace(WALK, image_size=np.zeros(2, int))
     assert not any(frames.any() for frames in implausible(imported).values())
+
+
+def test_a_body_that_is_elsewhere_from_one_frame_to_the_next_is_found() -> None:
+    """Beside where it was, as in footage that leaves a second out; not a little, nor nearer, which
+    one camera measures badly, nor at a cut, nor somebody who is as fast for a while.
+    """
+    across = np.zeros((len(WALK), 3))
+    across[90:, 0] = 1.0
+    leaps = moved(dict.fromkeys(AT, across))
+    assert np.flatnonzero(implausible(leaps)["leap"]).tolist() == [89, 90]
+    assert not implausible(moved(dict.fromkeys(AT, 0.2 * across)))["leap"].any()
+    assert not implausible(moved(dict.fromkeys(AT, across[:, [1, 0, 2]])))["leap"].any()
+    assert not implausible(replace(leaps, scene_starts=np.array([90])))["leap"].any()
+    seen = WALK.valid.copy()
+    seen[80:90] = False
+    assert not implausible(replace(leaps, valid=seen))["leap"].any()
+    across[90:, 0] = np.minimum(9.0 * (WALK.timestamps[90:] - WALK.timestamps[90]), 9.0)
+    assert not implausible(moved(dict.fromkeys(AT, across)))["leap"].any()

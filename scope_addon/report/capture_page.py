@@ -38,6 +38,7 @@ _SHORT = {
     "swing": "limb swings",
     "lean": "leans",
     "floating": "floats",
+    "leap": "leaps",
     "warned": "warning",
 }
 _MAX_SPANS = 60  # that the page lists

@@ -60,6 +60,7 @@ MARKER_NAMES = {
     "swing": "limb swings",
     "lean": "leans",
     "floating": "floats",
+    "leap": "leaps",
 }
 _MAX_MARKERS = 40  # more would clutter the timeline
 _GAP_S = 0.5  # spans closer than this share a marker
