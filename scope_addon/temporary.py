@@ -139,7 +139,7 @@ def hold(lock: Path) -> bool:
     It survives a power cut, because what it protects is otherwise found without it.
 
     :return: False if another process holds it, or it is no file of this user's own.
-    :raises OSError: the file cannot be made, or the file system has no locks.
+    :raises OSError: the file cannot be made, or the file system has no locks, or no owners.
     """
     is_new = False
     with suppress(FileExistsError):
@@ -152,6 +152,11 @@ def hold(lock: Path) -> bool:
             remove(lock)
         raise
     if handle is None:
+        # Some file systems of networks and of user space give a new file to another user, whose
+        # locks say nothing.
+        if is_new and _is_of_another_user(lock):
+            remove(lock)
+            raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
         return False
     _locks[lock] = handle
     sync_folder(lock.parent)
@@ -285,6 +290,13 @@ def _open_if_free(lock: Path) -> int | None:
 
 def _is_lock(status: os.stat_result) -> bool:
     return stat.S_ISREG(status.st_mode) and status.st_size == 0 and _is_own(status)
+
+
+def _is_of_another_user(path: Path) -> bool:
+    try:
+        return not _is_own(path.lstat())
+    except OSError:  # another process has removed it
+        return False
 
 
 def _is_own(status: os.stat_result) -> bool:

@@ -148,6 +148,18 @@ def test_files_of_another_owner_stay(tmp_path):
     assert len(os.listdir(tmp_path)) == LEFT
 
 
+@posix
+def test_where_new_files_are_another_users_nothing_is_taken_for_held(tmp_path, monkeypatch):
+    """As on a server's disk that gives all files to one user."""
+    monkeypatch.setattr(os, "geteuid", lambda: os.stat(tmp_path).st_uid + 1)
+    with pytest.raises(OSError, match="No locks"):
+        hold(tmp_path / "lock")
+    assert os.listdir(tmp_path) == []
+    (tmp_path / "lock").touch()
+    assert not hold(tmp_path / "lock")  # which another user may hold
+    assert os.listdir(tmp_path) == ["lock"]
+
+
 NAME = "scope-0123456789abcdef"
 
 

@@ -190,6 +190,15 @@ def test_of_two_batches_at_once_in_one_folder_the_second_is_refused(tmp_path):
     assert sorted(path.name for path in out.iterdir()) == ["a.glb", "a.npz", REPORT_NAME]
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows reports no owner")
+def test_a_batch_runs_where_all_files_are_another_users(folder, tmp_path, monkeypatch):
+    """As on a server's disk; then nothing says whether another batch runs."""
+    monkeypatch.setattr(os, "geteuid", lambda: os.stat(tmp_path).st_uid + 1)
+    out = tmp_path / "out"
+    assert batch(folder, out).run(1)["counts"]["done"] == 2
+    assert not (out / LOCK_NAME).exists()
+
+
 @pytest.mark.parametrize("later", ["fails", "is gone"])
 def test_results_of_another_folder_are_kept_after_a_later_run(tmp_path, later):
     """A run of the same folder that has not replaced them."""

@@ -150,7 +150,9 @@ def test_no_name_is_proposed_of_which_there_are_files_of_several_people(tmp_path
     assert proposed() == "walk_2.npz"
 
 
-def test_two_blenders_that_write_files_of_lists_to_one_folder_take_different_names(tmp_path):
+def test_two_blenders_that_write_files_of_lists_to_one_folder_take_different_names(
+    tmp_path, monkeypatch
+):
     capture = captured_with(motion_of(walk(0.1))).users_collection[0]
     capture.name = "walk"
     (tmp_path / "walk.person3.npz").write_text("mine")
@@ -164,6 +166,10 @@ def test_two_blenders_that_write_files_of_lists_to_one_folder_take_different_nam
         own.write_text("own")
     with unused_path(tmp_path, capture, "NPZ") as later:
         assert later.name == "walk_4.npz"
+    with monkeypatch.context() as patch:  # where all files are another user's
+        patch.setattr(os, "geteuid", lambda: os.stat(tmp_path).st_uid + 1)
+        with unused_path(tmp_path, capture, "NPZ") as path:
+            assert path.name == "walk_4.npz"
     left = [".walk_2.npz.lock", "walk.person3.npz", "walk_3.npz"]
     assert sorted(path.name for path in tmp_path.iterdir()) == left
 
