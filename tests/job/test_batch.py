@@ -600,3 +600,7 @@ def test_the_views_of_a_take_are_captured_together_and_once(tmp_path):
         assert entry["outputs"] == ["walk.npz"]
     (call,) = (take / "calls.log").read_text("utf-8").splitlines()
     assert json.loads(call)[1:3] == [str(take / "left.mp4"), str(take / "right.mp4")]
+    for name in ("right.mp4", "third.mp4"):  # replaced, and added
+        (take / name).write_text("another")
+        batch = Batch(tmp_path / "clips", tmp_path / "out", program, {}, [".npz"])
+        assert batch.run(1, views=True)["counts"]["done"] == 1
