@@ -203,6 +203,8 @@ SENTENCES = {
     "captured",
     "modifiers_left_out": "{file} does not show '{mesh}' as its modifiers do: {modifiers:names}; "
     "apply or remove these, and export again",
+    "bends_left_out": "{file} lacks the bends of these bones of '{rig}', as no such file can hold "
+    "B-bones: {bones:names}; set their Segments to 1 to see what the file shows",
     "shape_keys_left_out": "{file} lacks these shape keys of '{mesh}', with which its modifiers "
     "make other faces: {keys:names}; remove such modifiers, or change the keys, and export again",
     # an imported motion

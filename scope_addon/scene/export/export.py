@@ -24,7 +24,7 @@ from ....solver.body import Body
 from ...atomic_write import atomic_path, reason
 from ...errors import OutputError, UsageError
 from ...motion import Motion
-from ...notices import Notice
+from ...notices import Notice, notice
 from ...output_paths import WITHOUT_SCENE, check_output, person_paths
 from ...temporary import remove
 from .. import actions
@@ -186,6 +186,10 @@ def _write_one(
         _write(path, writers[suffix])
     for each in notices:
         options.warn(each)
+    for armature in rigs if suffix in (".glb", ".fbx", ".usdc") else ():
+        bones = [b.name for b in armature.data.bones if b.use_deform and b.bbone_segments > 1]
+        if bones:
+            options.warn(notice("bends_left_out", file=path.name, rig=armature.name, bones=bones))
 
 
 def export_motions(

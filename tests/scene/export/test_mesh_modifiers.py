@@ -84,6 +84,21 @@ def test_a_modifier_that_moves_by_itself_is_said(tmp_path):
     assert "mouth" in assert_shows(tmp_path / "rig.fbx", shown).shape_keys.key_blocks
 
 
+def test_bones_that_bend_are_said(tmp_path):
+    rig, skin = half_a_face()
+    skin.shape_key_clear()
+    (bone,) = (b for b in rig.data.bones if b.name == skin.vertex_groups[0].name)
+    bone.bbone_segments = 4
+    (warning,) = export(tmp_path / "rig.fbx", rig)
+    assert warning.startswith(f"rig.fbx lacks the bends of these bones of '{rig.name}'")
+    assert f"'{bone.name}'" in warning
+    bone.bbone_segments = 1
+    assert export(tmp_path / "rig.fbx", rig) == []
+    bone.bbone_segments = 4
+    bone.use_deform = False
+    assert export(tmp_path / "rig.fbx", rig) == []
+
+
 def _moving(skin, how):
     """Give the skin a modifier of which the file shows one frame alone."""
     kind = "MIRROR" if how == "after the armature" else "DISPLACE"
