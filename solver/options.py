@@ -148,7 +148,7 @@ def cold_stages(weights: Weights) -> tuple[Stage, ...]:
 
 def warm_stages(weights: Weights) -> tuple[Stage, ...]:
     """Return the stages of a fit from a state that is known."""
-    return (Stage(weights, 1e-6, 50),)
+    return (Stage(weights, 1e-6, 200),)
 
 
 COLD_STAGES = cold_stages(Weights())

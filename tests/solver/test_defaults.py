@@ -93,6 +93,16 @@ def test_where_no_heading_leads_to_the_lowest_cost_the_flipped_image_does():
         assert solver.fit(body, seen).cost < COSTLY * least
 
 
+def test_a_clip_of_2d_keypoints_alone_converges():
+    """Depth is hardly fixed, so that these three take 74, 102 and 65 iterations."""
+    body, index, everyone = people()
+    for seed in (2, 3, 4):
+        noise = SIGMA_PX * np.random.default_rng(seed).standard_normal((4, 17, 2))
+        pixels = np.asarray(everyone[seed].seen.keypoints2d.pixels) + noise
+        seen = Measurements(CAMERA, Keypoints2D(index, pixels, sigma_px=SIGMA_PX))
+        assert solver.fit_clip(body, seen).status is Status.CONVERGED
+
+
 def test_cold_starts_from_exact_points_find_every_limb():
     """Points of millimetres are taken for less exact at first, where the cost asks for it."""
     body, _, everyone = people()
