@@ -205,9 +205,6 @@ UNLIKELY = {
     "COCO's numbers for the body's, in space": lambda p: Measurements(
         keypoints3d=Keypoints3D(range(17), p.points)
     ),
-    "COCO's numbers for the body's, in the image": lambda p: Measurements(
-        CAMERA, Keypoints2D(range(17), p.seen.keypoints2d.pixels)
-    ),
 }
 
 
@@ -235,6 +232,13 @@ def test_clips_motions_and_batches_are_told_as_well(change, message):
     ):
         with pytest.warns(ScopeWarning, match=message):
             fit(body, frames)
+
+
+def test_pixels_that_have_the_numbers_of_other_points_are_told():
+    body, everyone = people()
+    seen = Measurements(CAMERA, Keypoints2D(range(17), everyone[0].seen.keypoints2d.pixels))
+    with pytest.warns(ScopeWarning, match="2D keypoints badly.* its own point"):
+        solver.fit(body, seen)
 
 
 def test_masked_points_are_no_misfit():
