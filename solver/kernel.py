@@ -85,7 +85,7 @@ def announce_compilation(*kernels: Any) -> None:
     missing = {compiled for compiled in kernels if not is_compiled(compiled)} - _announced
     if missing:
         _announced.update(missing)
-        _LOG.warning("Compiling the solver for this machine, once: a minute or two.")
+        _LOG.warning("Compiling the solver's part that this needs, once: a minute or two.")
 
 
 class NumbaCache:
