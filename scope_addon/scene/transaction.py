@@ -61,7 +61,7 @@ def all_or_nothing(
     :param actions: further ones whose content it may change, whatever uses them.
     """
     unique = list(dict.fromkeys(objects))
-    animated = [
+    animated: list[_SavedAnimation | _SavedAction] = [
         *(_SavedAnimation(owner) for owner in (*unique, *keys)),
         *map(_SavedAction, actions),
     ]
