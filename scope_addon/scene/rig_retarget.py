@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -203,9 +204,10 @@ def retarget(
     with all_or_nothing(bpy.context.scene, rig, topmost(rig)), skin_unmodified(rig):
         places = _places(source, frames)
         back_above = _back_above_root_object(rig, frames)
-        with at_rest(rig), current_frame_kept(bpy.context.scene):
+        with at_rest(rig), ExitStack() as at_frame:
             moved = _places(rig, frames)
             if len(moved) > 1:
+                at_frame.enter_context(current_frame_kept(bpy.context.scene))
                 present = np.array(rig.matrix_world, float)
                 show_frame(bpy.context.scene, frames[_most_upright(moved, present)])
             skeleton = probe(rig, bone_map.parts)

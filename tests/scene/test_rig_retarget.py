@@ -180,6 +180,17 @@ def test_rigify(rigify_rigs):
     assert guess_bone_map(metarig).parts == {f"DEF-{bone}": part for bone, part in before.items()}
 
 
+def test_what_was_posed_without_a_key_elsewhere_stays_so(source):
+    """Where nothing carries the rig, no frame is set, which would undo it."""
+    rig, _ = build_rig("unreal")
+    other = added_empty("other")
+    for frame in (1, 9):
+        other.keyframe_insert("location", frame=frame)
+    other.location.x = 3.0
+    run(source, rig)
+    assert other.location.x == 3.0
+
+
 def test_the_rigs_own_action_stays(source):
     rig, bone_of = build_rig("unreal")
     rig.pose.bones[0].keyframe_insert("location", frame=3)
