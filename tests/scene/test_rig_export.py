@@ -181,6 +181,22 @@ def test_controls_that_deform_nothing_are_left_out_on_request(tmp_path, suffix):
         np.testing.assert_allclose(seen(read, names, [int(first) + 10]), wanted, atol=1e-3)
 
 
+def test_a_stretched_rig_has_its_joints_in_place_in_bvh(tmp_path):
+    rig, bone_of = build_rig("unreal")
+    rig.scale = (1.0, 1.3, 0.8)
+    rng = np.random.default_rng(1)
+    for frame in (1, 3):
+        for bone in rig.pose.bones:
+            bone.rotation_mode = "QUATERNION"
+            bone.rotation_quaternion = (1.0, *rng.uniform(-0.4, 0.4, 3))
+            bone.keyframe_insert("rotation_quaternion", frame=frame)
+    wanted = seen(rig, bone_of.values(), [1, 2, 3])
+    export_rig(tmp_path / "rig.bvh", rig, ExportOptions())
+    read_back(tmp_path / "rig.bvh")
+    (read,) = bpy.data.objects
+    np.testing.assert_allclose(seen(read, bone_of.values(), [1, 2, 3]), wanted, atol=1e-3)
+
+
 def test_a_pelvis_moves_under_a_bone_on_the_ground_in_bvh(tmp_path):
     rig, bone_of = build_rig("unreal")
     bpy.ops.object.mode_set(mode="EDIT")

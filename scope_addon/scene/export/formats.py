@@ -245,7 +245,9 @@ def _place_at_rest(rig: bpy.types.Object) -> Matrix:
 
 
 def _unscaled(R: NDArray[np.float64]) -> NDArray[np.float64]:
-    rotations: NDArray[np.float64] = R / np.linalg.norm(R, axis=-2, keepdims=True)
+    """Return the nearest rotations (..., 3, 3) to matrices that may scale and shear."""
+    U, _, Vt = np.linalg.svd(R)
+    rotations: NDArray[np.float64] = U @ Vt
     return rotations
 
 
