@@ -50,6 +50,9 @@ SENTENCES = {
     "has its true speed; capture with --speed 1 for the speed at which it plays",
     "frame_rate_above_footage": "{footage} has {rate:g} frames per second; {wanted:g} would "
     "repeat some, so each was used once",
+    "repeated_frames": "{percent:.0f} % of the frames of {footage} repeat the one before, as after "
+    "a conversion to a higher frame rate, so the motion is jerky; capture with --fps {rate:g} on "
+    "the command line",
     "frame_size_changes": "the frame size changes within {footage}; all frames were scaled to the "
     "first one's",
     "decoding_stopped": "decoding {footage} stopped after {decoded} of about {total} frames; the "

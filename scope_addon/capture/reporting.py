@@ -34,6 +34,13 @@ GIVEN_FLOOR_M = 0.03  # of the floor above or below z = 0 in the world of a give
 # Relative deviation of the focal length above which the path of a camera that travels is unsure:
 # of an estimate from few edges of the background, or none.
 UNSURE_LENS = 0.15
+# Keypoints move by less than this share of the steps before and after, in frames that repeat the
+# one before; of 45 clips without such frames, at most a tenth of the frames does so.
+REPEATED_STEP = 0.3
+REPEATED_SHARE = 0.15  # of the frames
+FEWEST_STEPS = 20
+SURE_KEYPOINT = 0.5  # confidence
+FILM_RATES = (24.0, 25.0, 30.0)  # frames per second that footage is converted from
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen
 
 
@@ -80,6 +87,7 @@ def make_report(
         iterations=solved.iterations,
         cuts_s=[round(t, 3) for t in footage.cuts_s],
         warnings=footage.warnings
+        + repetition_warnings(name, float(video.fps), motions[0])
         + unused_option_warnings(video, options)
         + speed_warnings(video, options)
         + up_warnings(name, solved.up_source, is_still)
@@ -184,6 +192,31 @@ def up_warnings(name: str, up_source: str, is_still: bool) -> list[Notice]:
     if up_source in (LINES, GIVEN) or not is_still:
         return []
     return [notice("guessed_up", footage=name, degrees=UP_DEVIATIONS_DEG[up_source][is_still])]
+
+
+def repetition_warnings(name: str, fps: float, motion: Motion) -> list[Notice]:
+    """Say that frames repeat the one before, as after a conversion to a higher frame rate: the
+    person stands still in these, and leaps in the others. Compression changes their pixels, but
+    hardly where the keypoints are.
+
+    :param fps: of the captured frames.
+    """
+    confidence = motion.keypoints2d[..., 2]
+    step = np.diff(motion.keypoints2d[..., :2], axis=0)
+    length_px = np.linalg.norm(step, axis=-1)
+    length_px[np.minimum(confidence[1:], confidence[:-1]) < SURE_KEYPOINT] = np.nan
+    is_seen = motion.valid[1:] & motion.valid[:-1] & np.isfinite(length_px).any(axis=1)
+    if is_seen.sum() < FEWEST_STEPS:
+        return []
+    moved_px = np.zeros(len(length_px))
+    moved_px[is_seen] = np.nanmedian(length_px[is_seen], axis=1)
+    around_px = np.maximum(np.r_[0.0, moved_px[:-1]], np.r_[moved_px[1:], 0.0])
+    repeats = (moved_px < REPEATED_STEP * around_px)[is_seen].mean()
+    if repeats < REPEATED_SHARE:
+        return []
+    usual = [*FILM_RATES, *(fps / k for k in range(2, 9))]
+    rate = min(usual, key=lambda each: abs(np.log(each / (fps * (1.0 - repeats)))))
+    return [notice("repeated_frames", footage=name, percent=100.0 * repeats, rate=float(rate))]
 
 
 def unused_option_warnings(video: Video, options: CaptureOptions) -> list[Notice]:

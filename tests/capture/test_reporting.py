@@ -16,6 +16,7 @@ from scope.scope_addon.capture.options import capture_options
 from scope.scope_addon.capture.reporting import (
     camera_warnings,
     face_frames,
+    repetition_warnings,
     unused_option_warnings,
     up_warnings,
 )
@@ -23,7 +24,7 @@ from scope.scope_addon.capture.world.world_frame import BODIES, LINES
 from scope.scope_addon.options import Place, options_at
 from scope.solver import load_body, rotations
 
-from ..made_motion import made_face, made_motion
+from ..made_motion import made_face, made_motion, rows_of
 
 T = 300
 
@@ -231,3 +232,34 @@ def test_a_preset_that_ones_own_network_ignores_is_said(tmp_path):
     assert unused(tmp_path / "a.png", quality="fast", **own) == ["preset_of_own_network"]
     assert unused(tmp_path / "a.png", **own) == []
     assert unused(tmp_path / "a.png", quality="fast") == []
+
+
+def filmed(motion, shown, noise_px=0.3):
+    """The motion whose body walks across the image, and shows these moments in its frames."""
+    count = len(shown)
+    body_px = np.random.default_rng(1).uniform(-100.0, 100.0, (33, 2))
+    swing_px = 8.0 * np.sin(np.arange(33) + 0.2 * np.asarray(shown)[:, None])
+    noise = np.random.default_rng(2).normal(scale=noise_px, size=(count, 33, 2))
+    places = body_px + noise + 3.0 * np.asarray(shown)[:, None, None]
+    places[..., 0] += swing_px
+    keypoints = np.concatenate([places, np.ones((count, 33, 1))], axis=2)
+    names = np.array([f"point{k}" for k in range(33)])
+    part = rows_of(replace(motion, face={}), slice(0, count))
+    return replace(part, keypoints2d=keypoints.astype(np.float32), keypoints2d_names=names)
+
+
+@pytest.mark.parametrize(
+    ("fps", "every", "rate"), [(60.0, 2, 30.0), (30.0, 3, 10.0), (29.97, 5, 24.0)]
+)
+def test_frames_that_repeat_the_one_before_are_said(motion, fps, every, rate):
+    """Of a video converted from a lower rate; of 24 frames per second, every fourth is twice."""
+    k = np.arange(120)
+    shown = k - (k % 5 == 4) if every == 5 else k - k % every
+    (warning,) = repetition_warnings("a.mp4", fps, filmed(motion, shown))
+    assert warning.code == "repeated_frames"
+    assert warning.values["rate"] == pytest.approx(rate, rel=0.01)
+
+
+@pytest.mark.parametrize("shown", [np.arange(120), np.zeros(120), np.r_[:60, [59] * 15, 60:105]])
+def test_somebody_who_moves_stands_or_pauses_repeats_no_frames(motion, shown):
+    assert repetition_warnings("a.mp4", 30.0, filmed(motion, shown)) == []
