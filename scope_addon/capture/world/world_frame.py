@@ -264,7 +264,8 @@ def find_world(
     The up direction is estimated from the background's lines, or from all bodies and floors
     together. Each person's feet are taken relative to their own mean position, so that neither a
     step nor a wrong distance tilts the world. On uneven ground, feet do not determine the up
-    direction, and everybody's floor is what they stand on at first.
+    direction, and everybody's floor is what they stand on at first. In a still image, everybody's
+    floor is what they stand on, too: whoever was brought to another floor would leave the image.
 
     :param placed: the most prominent person first.
     :param lines: of the background, in the first frame's camera axes.
@@ -293,9 +294,8 @@ def find_world(
             heights.append(resting_height(person, contact, up))
     T_world_camera = _on_floor(T_world_first, up, heights[0], placed[0])
     relative = [height - heights[0] for height in heights]
-    return SharedWorld(
-        T_world_camera, [h if abs(h) > SAME_FLOOR_M else 0.0 for h in relative], up_source
-    )
+    same_m = SAME_FLOOR_M if len(placed[0].times) > 1 else 0.0
+    return SharedWorld(T_world_camera, [h if abs(h) > same_m else 0.0 for h in relative], up_source)
 
 
 def _on_floor(

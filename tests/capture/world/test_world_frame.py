@@ -109,6 +109,17 @@ def test_people_share_a_world_and_each_has_a_floor():
     assert abs(np.median(soles)) < 0.02
 
 
+def test_in_a_still_image_nobody_is_moved_to_the_floor_of_others():
+    """Somebody who seems to be 4 % farther away, and so stands lower: a clip's fit changes the
+    distance, an image's does not.
+    """
+    body = load_body("scope")
+    near = first_frame(seen_by(body, *walk(body)))
+    far = replace(near, joints=1.04 * near.joints, contact_points=1.04 * near.contact_points)
+    floors_m = find_world([near, far]).floors_m
+    assert floors_m == [0.0, pytest.approx(-0.04 * 1.6, abs=0.01)]
+
+
 def centroid(vertices, faces):
     """Centroid of the volume within a closed surface, by tetrahedra from the origin."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
