@@ -35,16 +35,28 @@ from ..rotations import hat
 from ..state import State
 from ..tree import BodyArrays, Tree
 from ..validation import check_finite, check_list, check_type
-from .normal_equations import gradient, motion_of_parts, moved, preconditioner, problem_of
+from .normal_equations import (
+    gradient,
+    motion_of_parts,
+    moved,
+    preconditioner,
+    problem_of,
+    remaining_decrease,
+)
 
 _STEP = 1e-5  # of the unknowns, radians, metres and shape
 _SHARE = 1e-6  # by which a measured number is changed, of a standard deviation its share
 _LEAST_CURVATURE = 1e-12  # smallest over largest eigenvalue of H: below, an unknown is not fixed
 _ADJOINT = 1e-7  # of its norm, by which conjugate gradients miss the adjoint's equation
 _UNSOLVED = 1e-3  # the same, of an adjoint that there is not
+# Share of the cost, and cost, by which a step may still lower it: fits with the default tolerance
+# have shares of up to 2e-4, those with other priors or weights than are given here 0.06 and more.
+_LEFT_SHARE = 1e-2
+_LEFT = 1e-3
 _NO_MINIMUM = (
     "The derivatives of a solution need a minimum, where the cost rises in every direction; fit "
-    "with a tolerance of 0, or give priors of what was not measured."
+    "the same measurements with these priors and options and a tolerance of 0, and give priors of "
+    "what was not measured."
 )
 _WEIGHTS = "weights"
 # the measurements' numbers that a solution depends on smoothly
@@ -162,6 +174,9 @@ class _Problem:
         self.tree, self.terms, self.stage = problem_of(
             body, self.measurements, self.priors, options
         )
+        decrease, cost = remaining_decrease(self.tree, self.terms, self.stage, state)
+        if not decrease <= _LEFT_SHARE * cost + _LEFT:
+            raise InvalidValueError(_NO_MINIMUM)
 
     def hessian(self) -> Array:
         """Return H (n, n)."""

@@ -169,6 +169,12 @@ def preconditioner(
     return solve
 
 
+def remaining_decrease(tree: Tree, terms: Terms, stage: Array, state: State) -> tuple[float, float]:
+    """Return the decrease of the cost that a hardly damped step predicts, and the cost."""
+    cost, pose, blocks, work = _linearized(tree, terms, stage, state)
+    return float(step(tree, pose, blocks, MIN_DAMPING, 1.0, work)), cost
+
+
 def _direction(tree: Tree, work: Workspace) -> Array:
     """Return the step (n,) that is in `work`."""
     return np.concatenate([work.x[0], work.u[1:].ravel(), work.dbeta[: tree.shape]])

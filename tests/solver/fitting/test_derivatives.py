@@ -164,6 +164,22 @@ def test_what_has_no_derivative_is_named(solution):
     )[NAMES[0]].any()
 
 
+@pytest.mark.parametrize(
+    "of_the_fit",
+    [
+        {"options": options(shape=100.0)},
+        {"priors": Priors(joint_weights=np.full(K, 100.0))},
+        {"measurements": replace(SEEN, keypoints2d=None)},
+    ],
+)
+def test_a_state_that_other_measurements_priors_or_weights_led_to_is_refused(of_the_fit):
+    given = {"measurements": SEEN, "priors": PRIORS, "options": options()}
+    state = fit(BODY, init=TRUTH, **given | of_the_fit).state
+    for wrt in ([], ["keypoints3d.points"]):
+        with pytest.raises(InvalidValueError, match="fit the same measurements with these priors"):
+            solution_gradient(BODY, state=state, loss=np.ones((K + 1, 3)), wrt=wrt, **given)
+
+
 def test_what_is_masked_has_no_influence():
     """As if its point were left out; the numbers below the mask were taken for measured ones."""
     points = np.ma.array(SEEN.keypoints3d.points)
