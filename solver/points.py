@@ -60,9 +60,11 @@ def numbered(body: object, measurements: Measurements) -> Measurements:
 
 def has_names(points: Any) -> bool:
     """Return whether one of a list of points is a name."""
-    if isinstance(points, np.ndarray):
-        return bool(points.dtype.kind == "U")
-    return isinstance(points, (list, tuple)) and any(isinstance(point, str) for point in points)
+    if isinstance(points, np.ndarray) and points.dtype.kind not in "UO":
+        return False
+    return isinstance(points, (list, tuple, np.ndarray)) and any(
+        isinstance(point, str) for point in points
+    )
 
 
 def with_numbers(numbers: Mapping[str, int], points: Any, what: str) -> Array:

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import as_array, as_integers
-from .errors import ShapeError
+from .errors import InvalidValueError, ShapeError
 from .part import Array
-from .validation import as_indices, check_finite, check_switch, warn_of_units
+from .validation import as_indices, check_finite, check_list, check_switch, warn_of_units
 
 
 class BodyArrays(Protocol):
@@ -72,7 +72,8 @@ def make_tree(body: BodyArrays, focal: bool = False) -> Tree:
 
     :raises ShapeError: an array is missing, does not fit the others, or a parent does not come
         before its child.
-    :raises InvalidValueError: an array holds NaN or infinity, or `focal` is neither True nor False.
+    :raises InvalidValueError: an array holds NaN or infinity, names are not one for each joint or
+        keypoint, or `focal` is neither True nor False.
     """
     check_switch(focal, "focal")
     missing = [name for name in _ARRAYS if not hasattr(body, name)]
@@ -96,6 +97,8 @@ def make_tree(body: BodyArrays, focal: bool = False) -> Tree:
     m = part.shape[0]
     v_bar = _check(body.v_bar, (m, 3), "v_bar")
     v = _check(body.V, (m, 3, p), "V")
+    _check_names(body, "joint_names", n)
+    _check_names(body, "keypoint_names", m)
     warn_of_units(np.cumsum(offsets, axis=0), "The body's joint offsets l")
     width = padded(p + focal)
     s_padded = np.zeros((n, 3, width))
@@ -136,6 +139,21 @@ def with_fixed_shape(tree: Tree, beta: ArrayLike) -> Tree:
         0,
         0,
     )
+
+
+def _check_names(body: BodyArrays, field: str, count: int) -> None:
+    """Check that a body that has names has one for each of its joints, the root included, or
+    keypoints.
+
+    :raises InvalidValueError: they are no list, more or fewer, or two are the same.
+    """
+    names = getattr(body, field, ())
+    check_list(names, f"{field} of the body", "part" if field == "joint_names" else "keypoint")
+    if len(names) and not len(set(names)) == len(names) == count:
+        raise InvalidValueError(
+            f"{field} of the body must be {count} different names, but are {len(names)}, of which "
+            f"{len(set(names))} differ; the first joint is the root."
+        )
 
 
 _ARRAYS = ("parents", "S", "l", "keypoint_part", "v_bar", "V")

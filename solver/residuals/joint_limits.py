@@ -113,12 +113,11 @@ def pack(
 
 
 def hinges_of(joint_names: Sequence[str]) -> tuple[Array, Array]:
-    """Return the tables of `accumulate` for the knees and elbows among a body's joint names; empty
-    if it has none.
+    """Return the tables of `accumulate` for the knees and elbows among a body's joint names but the
+    root's, which bends about nothing; empty if it has none.
     """
-    found = [
-        (joint_names.index(name), *hinge) for name, hinge in HINGES.items() if name in joint_names
-    ]
+    joints = joint_names[1:]
+    found = [(1 + joints.index(name), *hinge) for name, hinge in HINGES.items() if name in joints]
     if not found:
         return np.zeros((0, INTS), np.int64), np.zeros((0, FLOATS))
     joints, axes, lower, upper, swing = (np.array(column) for column in zip(*found, strict=True))

@@ -64,6 +64,7 @@ def test_names_give_what_their_numbers_give():
     pixels = project(POINTS)
     for named, numbered in (
         (Keypoints3D(NAMES, POINTS), Keypoints3D(NUMBERS, POINTS)),
+        (Keypoints3D(np.array(NAMES, object), POINTS), Keypoints3D(NUMBERS, POINTS)),
         (
             Keypoints3D(["joint1", 3, "set/5"], POINTS[:3]),
             Keypoints3D([M + 1, 3, 5], POINTS[:3]),

@@ -6,6 +6,7 @@ coefficients.
 import numpy as np
 import pytest
 from scope.solver import (
+    InvalidValueError,
     Keypoints2D,
     Keypoints3D,
     Measurements,
@@ -114,3 +115,31 @@ def test_arrays_that_cannot_be_written_to_need_no_other_machine_code():
         assert [len(each.signatures) for each in called] == compiled
         np.testing.assert_array_equal(found.t_camera_part, expected.t_camera_part)
     assert not np.shares_memory(make_tree(body).parents, body.parents)
+
+
+@pytest.mark.parametrize(
+    ("field", "names"),
+    [
+        ("joint_names", ["a", "b"]),  # as of a list without its root
+        ("joint_names", ["a", "b", "b"]),
+        ("joint_names", "abc"),
+        ("keypoint_names", list("abcde")),
+    ],
+)
+def test_names_that_are_not_one_for_each_are_refused(field, names):
+    body = random_body(np.random.default_rng(0), K=2, P=0, M=6)
+    setattr(body, field, names)
+    with pytest.raises(InvalidValueError, match=f"{field} of the body must be"):
+        make_tree(body)
+
+
+def test_a_root_named_like_a_hinge_has_no_limits():
+    """As of an arm alone, which turns freely about its elbow."""
+    body = random_body(np.random.default_rng(0), K=2, P=0, M=6)
+    body.joint_names = ["left_elbow", "right_elbow", "hand"]
+    _, _, points = forward(
+        body, np.eye(3), np.array([0.0, 0.0, 3.0]), np.tile(np.eye(3), (2, 1, 1)), []
+    )
+    fit(body, Measurements(keypoints3d=Keypoints3D(range(6), points)))
+    ints, _ = joint_limits.hinges_of(body.joint_names)
+    assert ints.ravel().tolist() == [1]
