@@ -57,6 +57,13 @@ def test_an_interrupted_capture_is_continued_until_the_footage_changes(tmp_path,
     assert not first.exists()
 
 
+def test_a_capture_of_another_version_is_not_continued(tmp_path, footage, monkeypatch):
+    first = end(tmp_path, footage, KeyboardInterrupt())
+    monkeypatch.setattr(unfinished, "code_version", lambda: "another")
+    with unfinished_capture(tmp_path, footage) as capture:
+        assert capture.folder not in (None, first)
+
+
 def written_again(path, content):
     """Replace a file's content in place, and leave its size and time."""
     before = path.stat()

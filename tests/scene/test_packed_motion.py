@@ -17,6 +17,7 @@ import pytest
 import scope
 from scope.scope_addon.errors import MotionFileError, UsageError
 from scope.scope_addon.motion import Motion
+from scope.scope_addon.scene import packed_motion
 from scope.scope_addon.scene.build import build_scene
 from scope.scope_addon.scene.export.export import export_motions
 from scope.scope_addon.scene.footage_strip import add_footage_strips
@@ -191,6 +192,16 @@ def test_hostile_content_is_an_error(people):
         armature[MOTION]["motion"] = content
         with pytest.raises(MotionFileError, match=f"text '{armature.name} motion'"):
             stored_motion(armature)
+
+
+def test_a_motion_that_is_too_large_is_refused_before_it_is_read(people, monkeypatch):
+    armature = people[0][0]
+    stored = armature[MOTION]["motion"]
+    monkeypatch.setattr(packed_motion, "_LARGEST_BYTES", len(stored))
+    assert len(stored_motion(armature)) > 0
+    monkeypatch.setattr(packed_motion, "_LARGEST_BYTES", len(stored) - 1)
+    with pytest.raises(MotionFileError, match="too much for a motion"):
+        stored_motion(armature)
 
 
 def test_a_removed_text_is_an_error(people):

@@ -18,6 +18,7 @@ from scope.scope_addon.errors import SetupError, UsageError
 from scope.solver.errors import ModelFileError
 
 PROGRAM = """
+import os
 from scope.scope_addon.capture.perception.adapters import network_server
 from scope.scope_addon.capture.perception.sessions import network_path, open_session
 if {direct}:
@@ -28,6 +29,7 @@ if {direct}:
     assert answer["outputs"], answer
 else:
     assert open_session(network_path("face_expression"), 1).get_outputs()
+assert os.environ["ORT_DISABLE_TELEMETRY"] == "1"  # which versions that tell anything obey
 """
 
 
