@@ -134,3 +134,17 @@ def test_files_of_an_earlier_number_of_people_in_a_store_are_named(memory, tmp_p
     report = json.loads(memory.cat_file(f"/key:SECRET@bucket/out/{REPORT_NAME}"))
     (warning,) = report["files"][0]["report"]["warnings"]
     assert "not part of this result: 'fine.person2.npz';" in warning
+
+
+def test_results_in_a_store_that_were_cut_are_captured_again(memory, tmp_path):
+    memory.pipe_file("/key:SECRET@bucket/clips/fine.mp4", b"clip")
+
+    def outcome():
+        assert run(tmp_path) == 0
+        (entry,) = json.loads(memory.cat_file(f"/key:SECRET@bucket/out/{REPORT_NAME}"))["files"]
+        return entry["status"]
+
+    assert outcome() == "done"
+    assert outcome() == "skipped"
+    memory.pipe_file("/key:SECRET@bucket/out/fine.npz", b"")
+    assert outcome() == "done"
