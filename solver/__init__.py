@@ -27,7 +27,6 @@ if TYPE_CHECKING:  # the public names and their modules, in the only place that 
     from .errors import ShapeError as ShapeError
     from .errors import UnitsWarning as UnitsWarning
     from .fitting.batch import fit_batch as fit_batch
-    from .fitting.batch import fit_clips as fit_clips
     from .fitting.clip import carry as carry
     from .fitting.clip import fit_clip as fit_clip
     from .fitting.derivatives import SolutionDerivatives as SolutionDerivatives

@@ -233,14 +233,6 @@ def left_jacobian(phi: ArrayLike) -> Array:
     return np.eye(3) + _versine(*angles) * cross + _lag(*angles) * (cross @ cross)
 
 
-def left_jacobian_inverse(phi: ArrayLike) -> Array:
-    """Return J^-1(phi), shape (..., 3, 3), for |phi| < 2 pi.
-
-    :raises ShapeError: the vectors have another shape.
-    """
-    return np.linalg.inv(left_jacobian(phi))
-
-
 def quaternion_from_matrix(rotation: ArrayLike) -> Array:
     """Return unit quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3).
 

@@ -1,22 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many frames, or many clips, on all cores. The kernels release the GIL, so plain threads do."""
+"""Many frames on all cores. The kernels release the GIL, so plain threads do."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from typing import Literal, TypeVar
 
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..points import frames_of
-from ..state import ClipFit, Fit, State, given_states
-from ..temporal import Temporal
+from ..state import Fit, State, given_states
 from ..tree import BodyArrays, make_tree
-from ..validation import check_count, check_list
-from .clip import fit_clip
+from ..validation import check_count
 from .frame_solver import fit_tree
 from .misfit import warn_of_mirrored_clip, warn_of_unlikely_shape
 
@@ -66,39 +63,6 @@ def fit_batch(
     ):
         warn_of_unlikely_shape([fitted.state.beta for fitted in fits], priors)
     return fits
-
-
-def fit_clips(
-    body: BodyArrays,
-    clips: Sequence[Sequence[Measurements] | Measurements],
-    *,
-    priors: Priors | None = None,
-    options: Options = Options(),  # noqa: B008 - frozen
-    temporal: Temporal | None = None,
-    focal: bool = False,
-    focal_weight: float = 1.0,
-    threads: int = 0,
-) -> list[ClipFit]:
-    """`fit_clip` on several clips of the same kind of body, one clip a thread; each comes out as
-    alone.
-
-    :param clips: the measurements of each clip's frames; all other arguments as of `fit_clip`.
-    :param threads: how many; 0 is one for each core.
-    :raises ShapeError: an array does not fit the body, or a clip has no frames.
-    :raises InvalidValueError: a value that no fit can use, in whichever clip.
-    """
-    check_list(clips, "clips", "clip")
-    priors = default_priors(body) if priors is None else priors
-    one = partial(
-        fit_clip,
-        body,
-        priors=priors,
-        options=options,
-        temporal=temporal,
-        focal=focal,
-        focal_weight=focal_weight,
-    )
-    return _spread(one, clips, threads)
 
 
 def _spread(work: Callable[[_T], _R], jobs: Iterable[_T], threads: int) -> list[_R]:

@@ -189,7 +189,6 @@ CALLS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
         solver.fit_clip,
         CLIPS | {"measurements": [SEEN, SEEN], "init": [REST, REST], "shape_frames": 500},
     ),
-    "fit_clips": (solver.fit_clips, CLIPS | {"clips": [[SEEN]], "threads": 1}),
     "fit_motion": (
         solver.fit_motion,
         {
@@ -274,7 +273,6 @@ CALLS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     "rotations.exp": (rotations.exp, VECTORS),
     "rotations.log": (rotations.log, MATRICES),
     "rotations.left_jacobian": (rotations.left_jacobian, VECTORS),
-    "rotations.left_jacobian_inverse": (rotations.left_jacobian_inverse, VECTORS),
     "rotations.quaternion_from_matrix": (rotations.quaternion_from_matrix, MATRICES),
     "rotations.matrix_from_quaternion": (
         rotations.matrix_from_quaternion,

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames and clips on several threads: the same results in the same order, and really at the same
-time.
-"""
+"""Frames on several threads: the same results in the same order, and really at the same time."""
 
 import sys
 import threading
@@ -9,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from scope.solver import ShapeError, fit, fit_batch, fit_clip, fit_clips
+from scope.solver import ShapeError, fit, fit_batch
 
 from .test_frame_solver import measured, scene
 
@@ -38,15 +36,6 @@ def test_initial_states_are_used_where_they_are_given():
         np.testing.assert_array_equal(found.t_camera_part, fit(BODY, m, init=init).t_camera_part)
     with pytest.raises(ShapeError, match="one initial state per frame, 3"):
         fit_batch(BODY, batch, init=[None])
-
-
-def test_clips_come_out_as_alone():
-    clips = [frames(4), frames(6)[2:]]
-    for threads in (1, 2):
-        for found, clip in zip(fit_clips(BODY, clips, threads=threads), clips, strict=True):
-            alone = fit_clip(BODY, clip)
-            np.testing.assert_array_equal(found.beta, alone.beta)
-            assert found.cost == alone.cost
 
 
 def test_nothing_to_fit_is_no_result_and_a_bad_frame_is_told():
