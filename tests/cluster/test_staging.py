@@ -4,12 +4,17 @@ does.
 """
 
 import hashlib
+import importlib
 import os
+from pathlib import Path
+from unittest.mock import MagicMock
 
 import pytest
 from scope.scope_addon import temporary
 from scope.scope_addon.cluster.remote import TOKEN, Staging
 from scope.scope_addon.errors import OutputError
+from scope.scope_addon.job.clip_task import CaptureSettings, ClipTask
+from scope.scope_addon.job.request import program_version
 
 
 @pytest.fixture
@@ -69,6 +74,20 @@ def test_an_attempt_that_was_given_up_can_not_be_published(out):
         (folder / "below" / "b.npz").write_text("late")
     assert not staging.publish(folder, ["below/a.npz"], content)
     assert names(out) == sorted([f"{staging.folder.name}-lock", f"{staging.folder.name}/{TOKEN}"])
+
+
+def test_a_late_worker_makes_no_folder_of_an_attempt_that_was_given_up(out, tmp_path, monkeypatch):
+    """Nobody would remove it: the batch may have ended."""
+    of_worker = importlib.import_module("scope.scope_addon.cluster.worker")
+    monkeypatch.setattr(of_worker, "get_worker", lambda: MagicMock(**{"state.nthreads": 1}))
+    staging = Staging(out)
+    folder = staging.attempt(0)
+    staging.close()
+    settings = CaptureSettings({}, (".npz",))
+    task = ClipTask("a", "a.mp4", str(tmp_path / "a.mp4"), folder, "", settings)
+    entry = of_worker.capture_on_worker(task, "key", ("never",), 1, program_version())
+    assert entry["status"] == of_worker.LOST
+    assert not Path(folder).parent.exists()
 
 
 def test_results_may_be_on_another_disk(out, tmp_path, monkeypatch):
