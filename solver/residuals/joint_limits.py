@@ -116,8 +116,8 @@ def hinges_of(joint_names: Sequence[str]) -> tuple[Array, Array]:
     """Return the tables of `accumulate` for the knees and elbows among a body's joint names but the
     root's, which bends about nothing; empty if it has none.
     """
-    joints = joint_names[1:]
-    found = [(1 + joints.index(name), *hinge) for name, hinge in HINGES.items() if name in joints]
+    below = joint_names[1:]
+    found = [(1 + below.index(name), *hinge) for name, hinge in HINGES.items() if name in below]
     if not found:
         return np.zeros((0, INTS), np.int64), np.zeros((0, FLOATS))
     joints, axes, lower, upper, swing = (np.array(column) for column in zip(*found, strict=True))
