@@ -77,7 +77,7 @@ def test_an_attempt_that_was_given_up_can_not_be_published(out):
 
 
 def test_a_late_worker_makes_no_folder_of_an_attempt_that_was_given_up(out, tmp_path, monkeypatch):
-    """Nobody would remove it: the batch may have ended."""
+    """Nobody would remove it: the batch may have ended. Nor does one with another version begin."""
     of_worker = importlib.import_module("scope.scope_addon.cluster.worker")
     monkeypatch.setattr(of_worker, "get_worker", lambda: MagicMock(**{"state.nthreads": 1}))
     staging = Staging(out)
@@ -88,6 +88,8 @@ def test_a_late_worker_makes_no_folder_of_an_attempt_that_was_given_up(out, tmp_
     entry = of_worker.capture_on_worker(task, "key", ("never",), 1, program_version())
     assert entry["status"] == of_worker.LOST
     assert not Path(folder).parent.exists()
+    entry = of_worker.capture_on_worker(task, "key", ("never",), 1, "another version")
+    assert entry["status"] == of_worker.REFUSED
 
 
 def test_results_may_be_on_another_disk(out, tmp_path, monkeypatch):

@@ -6,6 +6,7 @@ this computer alone.
 from __future__ import annotations
 
 import re
+import socket
 import urllib.error
 import urllib.request
 from dataclasses import replace
@@ -59,6 +60,15 @@ def pose(body):
 
 def shades(time_s, value):
     return Picture(0, time_s, time_s, np.full((240, 320, 3), value, np.uint8))
+
+
+def test_other_computers_and_those_who_do_not_know_the_address_get_nothing(body):
+    with PreviewPage(body) as page, PreviewPage(body) as other:
+        assert page.address.rpartition("/")[2] != other.address.rpartition("/")[2]
+        port = int(re.search(r":(\d+)/", page.address)[1])
+        # Another address of this computer, on which a server for others would listen, too.
+        with pytest.raises(OSError, match=r"refused|timed out|assign"):
+            socket.create_connection(("127.0.0.2", port), timeout=5)
 
 
 def test_the_page_shows_the_picture_of_the_pose_with_the_skeleton(body, pose):

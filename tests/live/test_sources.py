@@ -243,6 +243,14 @@ def test_a_playlist_does_not_open_files_of_this_computer(tmp_path):
             all_pictures(address)
 
 
+def test_a_list_that_is_no_playlist_of_a_stream_opens_nothing(tmp_path):
+    """FFmpeg knows formats that name any further files and devices."""
+    (tmp_path / "part.ts").write_bytes(encoded(moving(12)))
+    with served(tmp_path, "list.txt", b"ffconcat version 1.0\nfile part.ts\n") as address:
+        with pytest.raises(VideoError, match="cannot be opened"):
+            all_pictures(address)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
