@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A rig that takes the importer too long, or too much memory, ends the command with one
-sentence.
+"""A rig that takes the importer too long, or too much memory, ends the command with one sentence;
+and what Blender's module leaves.
 """
 
+import os
+import signal
 import subprocess
 import sys
 
 import pytest
+from scope.scope_addon.temporary import remove_abandoned
 
 CODE = """
 import pathlib, sys, time
@@ -48,3 +51,22 @@ def test_time_and_memory_are_bounded(tmp_path, seconds, work, says):
         assert done.stderr.startswith(f"scope: {rig}: ")
         assert says in done.stderr
         assert done.stderr.count("\n") == 1
+
+
+KILLED = """
+import os, signal
+from scope.scope_addon.command_line.blender_module import load_blender
+load_blender()
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.usefixtures("blender_module")
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
+def test_what_a_killed_process_has_left_of_blenders_module_is_removed_by_the_next_one(tmp_path):
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    killed = subprocess.run([sys.executable, "-c", KILLED], env=environment, check=False)
+    assert killed.returncode == -signal.SIGKILL
+    assert list(tmp_path.iterdir())
+    remove_abandoned(tmp_path)
+    assert list(tmp_path.iterdir()) == []
