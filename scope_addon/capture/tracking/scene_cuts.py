@@ -105,7 +105,8 @@ def _thumbnail(image_rgb: Uint8Array) -> Float32Array:
 
 def _is_blended(thumbnails: Sequence[Float32Array]) -> bool:
     """Return whether the first and the last thumbnail show two scenes, and the others are blends of
-    these, or of nearly one colour.
+    these, or of nearly one colour. A frame that differs from its neighbour is none: a flash shows a
+    scene for itself.
     """
     first = thumbnails[0]
     last = thumbnails[-1]
@@ -113,6 +114,10 @@ def _is_blended(thumbnails: Sequence[Float32Array]) -> bool:
         return False
     if _difference_of_pattern(first, last) < MIN_DIFFERENCE_OF_BLENDED:
         return False
+    for end, neighbour in ((first, thumbnails[1]), (last, thumbnails[-2])):
+        is_blank = neighbour.std() < MIN_CONTRAST
+        if not is_blank and _difference_of_pattern(end, neighbour) >= MIN_DIFFERENCE_OF_PATTERN:
+            return False
     patterns = np.array([each - each.mean() for each in thumbnails if each.std() >= MIN_CONTRAST])
     patterns = patterns.reshape(len(patterns), -1)
     scenes = patterns[[0, -1]]

@@ -72,7 +72,7 @@ def test_the_same_scene_in_another_light_after_a_gap_is_not_a_cut(factors: np.nd
     "frames",
     [
         [scene(0)] * 10 + [np.full((H, W, 3), 250, np.uint8)] + [scene(0)] * 10,
-        [scene(0)] * 10 + [scene(1)] + [scene(0)] * 10,
+        [scene(0)] * 40 + [scene(1)] + [scene(0)] * 40,
         [scene(0)] * 10 + [np.zeros((H, W, 3), np.uint8)] * 10 + [scene(0)] * 10,
         [scene(0, 4000)[:, 60 * k : 60 * k + W] for k in range(40)],
         [brightened(scene(0), 0.2 + k / 60) for k in range(60)],
