@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 import time
+import warnings
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from ...solver import (
     Options,
     Priors,
     State,
+    UnitsWarning,
     fit,
     load_body,
     load_joint_prior,
@@ -63,6 +65,8 @@ def smplify(quick: bool) -> dict[str, Any]:
     if not DATA.is_dir():
         print(f"{DATA} does not exist: nothing was measured; put the clips there", file=sys.stderr)
         return {}
+    # Nothing keeps a dense fit's root from several turns, which are rotations like others.
+    warnings.simplefilter("ignore", UnitsWarning)
     body = load_body("scope")
     with np.load(fitted_motions()) as data:
         prior = PosePrior.of(data["poses"][data["valid"]][::PRIOR_EVERY, 3:].astype(float))
