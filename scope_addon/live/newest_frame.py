@@ -198,9 +198,10 @@ class NewestFrame:
             if not self.received:
                 self._began_s = 0.0 if self._source.ends else picture.timestamp_s
         index = self._first_index + picture.index
-        time_s = max(
-            picture.timestamp_s - self._began_s, self._last_s + 1e-3 if self.received else 0.0
-        )
+        if self.received:  # of another connection or programme, times may go back, and go on here
+            latest_s = picture.timestamp_s - self._last_s - 1e-3
+            self._began_s = min(self._began_s, latest_s)
+        time_s = max(picture.timestamp_s - self._began_s, 0.0)
         if self.received and not is_first:
             self._report_pause(picture.arrived_s - self._arrived_s)
         self._arrived_s = picture.arrived_s

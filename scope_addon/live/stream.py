@@ -179,11 +179,13 @@ class SentTimes:
     several at once, and a network delays some, which their own times do not show.
 
     Times that go away from the clock by more than `KEY_FRAME_S`, as those of a sender that counts
-    them wrongly, are not used any more: what comes at once is hardly longer.
+    them wrongly, are not used any more: what comes at once is hardly longer. From there on, it is
+    when frames arrive, by the same constant, so that no time is left out or comes twice.
     """
 
     def __init__(self) -> None:
         self._offset_s = 0.0  # of the clock
+        self._ahead_s = 0.0  # of the last frame, of when it arrived
         self._last_s = -np.inf
         self._are_wrong = False
 
@@ -193,13 +195,15 @@ class SentTimes:
         :param time_s: its own time; None if it has none.
         """
         if time_s is None or self._are_wrong:
-            return arrived_s
+            return arrived_s + self._ahead_s
         if not 0.0 < time_s - self._last_s <= LEAP_S:  # another programme begins
             self._offset_s = arrived_s - time_s
         self._last_s = time_s
-        filmed_s = self._offset_s + time_s
-        self._are_wrong = abs(arrived_s - filmed_s) > KEY_FRAME_S
-        return arrived_s if self._are_wrong else filmed_s
+        ahead_s = self._offset_s + time_s - arrived_s
+        self._are_wrong = abs(ahead_s) > KEY_FRAME_S
+        if not self._are_wrong:
+            self._ahead_s = ahead_s
+        return arrived_s + self._ahead_s
 
 
 def _is_fetched(container: InputContainer) -> bool:
