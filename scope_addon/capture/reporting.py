@@ -40,7 +40,8 @@ REPEATED_STEP = 0.3
 REPEATED_SHARE = 0.15  # of the frames
 FEWEST_STEPS = 20
 SURE_KEYPOINT = 0.5  # confidence
-FILM_RATES = (24.0, 25.0, 30.0)  # frames per second that footage is converted from
+FILM_RATES = (24.0, 25.0, 30.0, 50.0)  # frames per second that footage is converted from
+SAME_RATE = 0.1  # relative, within which one of these is meant
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen
 
 
@@ -214,8 +215,11 @@ def repetition_warnings(name: str, fps: float, motion: Motion) -> list[Notice]:
     repeats = (moved_px < REPEATED_STEP * around_px)[is_seen].mean()
     if repeats < REPEATED_SHARE:
         return []
+    shown = fps * (1.0 - repeats)
     usual = [*FILM_RATES, *(fps / k for k in range(2, 9))]
-    rate = min(usual, key=lambda each: abs(np.log(each / (fps * (1.0 - repeats)))))
+    rate = min(usual, key=lambda each: abs(each - shown))
+    if abs(rate - shown) > SAME_RATE * shown:
+        rate = round(shown)
     return [notice("repeated_frames", footage=name, percent=100.0 * repeats, rate=float(rate))]
 
 
