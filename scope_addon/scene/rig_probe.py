@@ -25,7 +25,7 @@ from ..retarget.bone_map import PHALANGES, check_bone_count
 from ..retarget.fingers import bone_ends
 from ..retarget.rest_pose import RestPose
 from ..retarget.skeleton import BoneMotion, Skeleton
-from .actions import assign_action, bone_path, fcurves_of, nla_strips, used_slot
+from .actions import assign_action, bone_path, fcurves_of, nla_strips, read_keys, used_slot
 from .character.root_object import root_object, topmost
 from .datablocks import changed, is_deformed_by, modifiers_off
 from .rig_action import channel_of_rotation
@@ -41,6 +41,14 @@ _MAX_CHECKED_FRAMES = 10
 _MAX_DEVIATION = np.radians(20)
 _MAX_SHIFT = 0.05  # of the root bone's head from where it should be, as a share of the rig's size
 _VISIBLE = 1e-3  # of a bone's pose: radians, factors and shares of its length
+# Values of a bone's channels.
+_AT_REST = {
+    "location": (0.0, 0.0, 0.0),
+    "rotation_axis_angle": (0.0, 0.0, 1.0, 0.0),
+    "rotation_euler": (0.0, 0.0, 0.0),
+    "rotation_quaternion": (1.0, 0.0, 0.0, 0.0),
+    "scale": (1.0, 1.0, 1.0),
+}
 # The part that carries each part of a limb; hips and shoulders move with the pelvis.
 _CARRIED_BY = {"knee": "hip", "ankle": "knee", "elbow": "shoulder", "wrist": "elbow"}
 # Of the lowest bone from the rig's origin, as a share of the rig's size.
@@ -278,8 +286,8 @@ def _is_driven(rig: bpy.types.Object, key: BoneMotion) -> bool:
 
 
 def posed_bones(rig: bpy.types.Object, names: Sequence[str]) -> list[Notice]:
-    """Return a warning about bones above mapped ones that are posed or in the NLA: they move the
-    motion, which was measured with them at rest.
+    """Return a warning about bones above mapped ones that are posed, or that the NLA poses: they
+    move the motion, which was measured with them at rest.
 
     :param names: of the mapped bones.
     """
@@ -291,6 +299,7 @@ def posed_bones(rig: bpy.types.Object, names: Sequence[str]) -> list[Notice]:
         for strip in nla_strips(rig)
         if strip.action
         for curve in fcurves_of(strip.action)
+        if _leaves_rest(curve)
     }
     moving = [
         name
@@ -298,7 +307,7 @@ def posed_bones(rig: bpy.types.Object, names: Sequence[str]) -> list[Notice]:
         if name not in names
         and (
             _is_posed(rig.pose.bones[name])
-            or any(path.startswith(bone_path(name, "")) for path in in_nla)
+            or any(bone_path(name, channel) in in_nla for channel in _AT_REST)
         )
     ]
     return [notice("posed_bones", bones=moving, rig=rig.name)] if moving else []
@@ -309,6 +318,18 @@ def _is_posed(bone: bpy.types.PoseBone) -> bool:
     offset = np.array(bone.matrix_basis, float) - np.eye(4)
     offset[:3, 3] /= bone.length
     return bool(np.abs(offset).max() > _VISIBLE)
+
+
+def _leaves_rest(curve: bpy.types.FCurve) -> bool:
+    """Return whether a curve of a bone's location, rotation or scale has other values than at rest,
+    as far as its keys tell; all that is keyed together with a posed bone has keys at rest.
+    """
+    rest = _AT_REST.get(curve.data_path.rpartition(".")[2])
+    if rest is None:
+        return False
+    values = read_keys(curve)[:, 1]
+    is_keyed = len(values) > 0 and len(curve.modifiers) == 0
+    return not is_keyed or bool(np.abs(values - rest[curve.array_index]).max() > _VISIBLE)
 
 
 def _farthest_frames(keys: Sequence[BoneMotion], path: NDArray[np.float64]) -> list[int]:
