@@ -41,6 +41,7 @@ from .command_line.cluster_arguments import (
 from .command_line.import_command import add_import
 from .command_line.live_command import add_live
 from .command_line.outputs import (
+    OF_RIGS,
     check_blender,
     check_outputs,
     checked_rigs,
@@ -328,7 +329,9 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     )
     check_blender(outputs)
     check_memory_limit(with_scene=any(path.suffix.lower() not in WITHOUT_SCENE for path in outputs))
-    named = WatchedFiles(files_of_options(vars(args)))
+    # A rig may be edited during the capture.
+    captured_with = {name: value for name, value in vars(args).items() if name not in OF_RIGS}
+    named = WatchedFiles(files_of_options(captured_with))
     body, options = body_and_options(args)
     options = with_window_seconds(options, args)
     # Imported here, so that --help and errors in the arguments are printed immediately.

@@ -66,9 +66,10 @@ def _is_shipped(folder: Path) -> bool:
 # Arguments and options that name footage, or another file to read.
 FOOTAGE = ("video", "source")
 VIEWS = "views"
+# They decide what is written, not what is captured.
+OF_RIGS = ("retarget", "bone_map", "expression_map")
 OTHER_INPUTS = (
-    *("motion", "body", "calibration", "camera_path", "retarget", "bone_map", "expression_map"),
-    *("detector", "keypoints"),
+    *("motion", "body", "calibration", "camera_path", *OF_RIGS, "detector", "keypoints"),
 )
 
 # Arguments that name a file to write beside the results.

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -243,3 +244,21 @@ def test_a_file_of_an_option_that_is_replaced_during_a_capture_is_noticed(
         said = capsys.readouterr().err.removeprefix("scope: ")
     assert said.startswith(f"{file} was changed while it was read")
     assert not list(tmp_path.glob("*.npz"))
+
+
+def test_a_rig_may_be_edited_during_a_capture(tmp_path, capsys, monkeypatch, texture_and_rigs):
+    """It decides nothing of what is captured, and is loaded after that."""
+    rig = tmp_path / "rig.blend"
+    rig.write_bytes(Path(texture_and_rigs[1][0]).read_bytes())
+
+    def placed_videos(_):
+        raise UsageError("the results are written")
+
+    def edit(*_, **__):
+        os.utime(rig, (1e9, 1e9))
+        return SimpleNamespace(report=SimpleNamespace(placed_videos=placed_videos))
+
+    monkeypatch.setattr(pipeline, "capture", edit)
+    out = str(tmp_path / "out.glb")
+    main(["capture", str(SAMPLE), "--retarget", str(rig), "-o", out, "--quiet"])
+    assert "the results are written" in capsys.readouterr().err
