@@ -181,6 +181,18 @@ def test_controls_that_deform_nothing_are_left_out_on_request(tmp_path, suffix):
         np.testing.assert_allclose(seen(read, names, [int(first) + 10]), wanted, atol=1e-3)
 
 
+@pytest.mark.parametrize("suffix", [".glb", ".fbx"])
+def test_a_rig_of_controls_alone_is_not_written_without_them(tmp_path, suffix):
+    """The file would hold no motion at all."""
+    rig, _ = build_rig("unreal")
+    for bone in rig.data.bones:
+        bone.use_deform = False
+    with pytest.raises(UsageError, match="no bone of 'unreal' deforms anything"):
+        export_rig(tmp_path / f"rig{suffix}", rig, ExportOptions(deform_bones=True))
+    assert list(tmp_path.iterdir()) == []
+    export_rig(tmp_path / f"rig{suffix}", rig, ExportOptions())
+
+
 def test_a_stretched_rig_has_its_joints_in_place_in_bvh(tmp_path):
     rig, bone_of = build_rig("unreal")
     rig.scale = (1.0, 1.3, 0.8)

@@ -170,6 +170,12 @@ def _write_one(
             raise UsageError(
                 f"cannot write {path.name}: the capture's armature is not in a scene; capture again"
             )
+        leaves_controls_out = options.deform_bones and suffix in (".glb", ".fbx")
+        if leaves_controls_out and not any(bone.use_deform for bone in rig.data.bones):
+            raise UsageError(
+                f"no bone of '{rig.name}' deforms anything, so none would be left; switch Only "
+                "Deform Bones off, on the command line leave out --deform-bones"
+            )
         if suffix != ".blend":  # which has keys alone
             check_samples(scene, rigs)
         writers = {
