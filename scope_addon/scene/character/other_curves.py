@@ -197,6 +197,8 @@ def exchange_measurements(
         bone_property_path(*names): names
         for names in now
         if not np.array_equal(was[names], now[names], equal_nan=True)
+        and np.isfinite(was[names]).any()
+        and np.isfinite(now[names]).any()
     }
     for curve in _curves(armature) if changed else ():
         names = changed.get(curve.data_path)

@@ -349,6 +349,16 @@ def test_the_contact_and_confidence_of_exchanged_limbs_are_exchanged(limbs):
         bpy.ops.scope.exchange_sides(start=40, end=52, limbs=limbs)
 
 
+def test_sides_are_exchanged_where_the_deviation_of_one_is_unknown():
+    motion = motion_of(walk(3.0))
+    sigma_m = np.full(motion.joint_confidence.shape, 0.01, np.float32)
+    sigma_m[:, NAMES.index("right_wrist")] = np.nan
+    armature = captured_with(replace(motion, joint_sigma_m=sigma_m))
+    bpy.ops.scope.exchange_sides(start=1, end=len(motion), limbs="arms")
+    assert len(listed_corrections(armature)) == 1
+    assert measured(armature, 20, ["left_wrist"], "sigma_cm") == pytest.approx([1.0])
+
+
 def move_keys(rig, factor, shift):
     """Move all keys in time as in the Dope Sheet."""
     for curve in fcurves(rig):
