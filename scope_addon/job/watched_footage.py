@@ -28,15 +28,16 @@ class WatchedFiles:
     """
 
     def __init__(self, files: Iterable[Path]) -> None:
-        self._states = {file: _size_and_time(file) for file in files}
+        self._states = {file: (_size_and_time(file), _whole_content(file)) for file in files}
 
     def check(self) -> None:
-        """Compare the files with what they were.
+        """Compare the files with what they were; one that was written again with the same content
+        is the same.
 
         :raises ChangedFootageError: one was replaced, changed or removed.
         """
-        for file, before in self._states.items():
-            if _size_and_time(file) != before:
+        for file, (before, content) in self._states.items():
+            if _size_and_time(file) != before and _whole_content(file) != content:
                 raise _changed(file)
 
 
@@ -170,6 +171,16 @@ def _size_and_time(file: Path) -> tuple[int, ...]:
         return state_of(file)[2:]
     except OSError:
         return ()
+
+
+def _whole_content(file: Path) -> bytes:
+    """Return a hash of a file; empty if it cannot be read, which whoever reads it says."""
+    digest = hashlib.sha256()
+    try:
+        add_content(digest, file, _MOST_BYTES)
+    except OSError:
+        return b""
+    return digest.digest()
 
 
 def _changed(file: Path) -> ChangedFootageError:

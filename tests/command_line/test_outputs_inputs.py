@@ -14,9 +14,10 @@ import pytest
 from scope.scope_addon.capture import pipeline
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line.outputs import FOOTAGE, OTHER_INPUTS, check_outputs
-from scope.scope_addon.errors import UsageError
+from scope.scope_addon.errors import ChangedFootageError, UsageError
 from scope.scope_addon.job import worker
 from scope.scope_addon.job.request import JobRequest
+from scope.scope_addon.job.watched_footage import WatchedFiles
 
 RIG_WITH_TEXTURE = """
 import os, sys, bpy
@@ -244,6 +245,20 @@ def test_a_file_of_an_option_that_is_replaced_during_a_capture_is_noticed(
         said = capsys.readouterr().err.removeprefix("scope: ")
     assert said.startswith(f"{file} was changed while it was read")
     assert not list(tmp_path.glob("*.npz"))
+
+
+def test_a_file_of_an_option_that_is_saved_again_as_it_was_is_the_same(tmp_path):
+    file = tmp_path / "camera.json"
+    file.write_text("{}")
+    watched = WatchedFiles([file])
+    os.utime(file, (1e9, 1e9))
+    watched.check()
+    file.write_text("[]")
+    with pytest.raises(ChangedFootageError, match="camera.json was changed"):
+        watched.check()
+    file.unlink()
+    with pytest.raises(ChangedFootageError, match="camera.json was changed"):
+        watched.check()
 
 
 def test_a_rig_may_be_edited_during_a_capture(tmp_path, capsys, monkeypatch, texture_and_rigs):
