@@ -231,11 +231,12 @@ def test_a_second_capture_of_the_same_name_is_refused(tmp_path, body, monkeypatc
 
 def test_what_hinders_a_recording_though_nothing_is_recorded_is_named(tmp_path, capfd):
     """Such as a lock that another program has written into, which could not be found otherwise."""
-    (tmp_path / ".take.recording.lock").write_text("another's")
+    lock = tmp_path / ".take.recording.lock"
+    lock.write_text("another's")
     assert main(["live", str(SAMPLE), "--record", str(tmp_path / "take.npz")]) == 2
-    said = f"as {tmp_path}/.take.recording.lock says; give another name with --record, or remove"
+    said = f"as {lock} says; give another name with --record, or remove"
     assert said in capfd.readouterr().err
-    assert (tmp_path / ".take.recording.lock").read_text("utf-8") == "another's"
+    assert lock.read_text("utf-8") == "another's"
 
 
 def test_of_two_recordings_that_begin_at_once_neither_replaces_the_other(tmp_path, body):
