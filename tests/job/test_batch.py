@@ -82,6 +82,11 @@ def calls(folder):
     return found
 
 
+def literal(path):
+    """Return a pattern of a path, which has backslashes on Windows."""
+    return re.escape(str(path))
+
+
 def batch(folder, out, options=None, suffixes=(".npz", ".glb")):
     program = [sys.executable, "-c", PROGRAM]
     return Batch(folder, out, program, options or {}, suffixes)
@@ -151,7 +156,9 @@ def test_results_of_another_folder_are_kept(folder, tmp_path):
     other.mkdir()
     (other / "a.mp4").write_text("another day")
     for again in (False, True):
-        with pytest.raises(UsageError, match=f"'a' of {other} .* name of {renamed}; .* --out"):
+        with pytest.raises(
+            UsageError, match=f"'a' of {literal(other)} .* name of {literal(renamed)}; .* --out"
+        ):
             batch(other, out).run(1, again=again)
     assert (out / "a.npz").read_text() == "result of ok"
     (other / "a.mp4").rename(other / "f.mp4")
@@ -162,7 +169,9 @@ def test_results_of_another_folder_are_kept(folder, tmp_path):
     (third / "f.mp4").write_text("a third day")
     for name, text, first in (("a", "ok", renamed), ("f", "another day", other)):
         (third / "f.mp4").rename(third / f"{name}.mp4")
-        with pytest.raises(UsageError, match=f"'{name}' of {third} .* name of {first}; .* --out"):
+        with pytest.raises(
+            UsageError, match=f"'{name}' of {literal(third)} .* name of {literal(first)}; .* --out"
+        ):
             batch(third, out).run(1)
         assert (out / f"{name}.npz").read_text() == f"result of {text}"
         (third / f"{name}.mp4").rename(third / "f.mp4")
@@ -180,7 +189,9 @@ def test_of_two_batches_at_once_in_one_folder_the_second_is_refused(tmp_path):
     out = tmp_path / "out"
 
     def run_other(stage, done, total):
-        with pytest.raises(UsageError, match=f"another batch writes to {out}, as .* --out"):
+        with pytest.raises(
+            UsageError, match=f"another batch writes to {literal(out)}, as .* --out"
+        ):
             batch(other, out).run(1)
 
     report = batch(day, out).run(1, progress=run_other)
@@ -215,7 +226,9 @@ def test_results_of_another_folder_are_kept_after_a_later_run(tmp_path, later):
         (clips / "a.mp4").unlink()
     batch(clips, out).run(1, again=True)
     (other / "a.mp4").write_text("another day")
-    with pytest.raises(UsageError, match=f"'a' of {other} .* name of {clips}; .* --out"):
+    with pytest.raises(
+        UsageError, match=f"'a' of {literal(other)} .* name of {literal(clips)}; .* --out"
+    ):
         batch(other, out).run(1)
     assert (out / "a.npz").read_text() == "result of ok"
 

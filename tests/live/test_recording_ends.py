@@ -3,6 +3,7 @@
 
 import errno
 import json
+import re
 import shutil
 import signal
 import subprocess
@@ -39,6 +40,11 @@ CAMERA = Camera(pinhole(640, 480, 600.0), np.zeros(5), "given")
 SOURCE = SimpleNamespace(name="fake", fps=Fraction(30), speed=1.0)
 SIZE = (640, 480)
 EARLIER = b"an earlier take"
+
+
+def literal(path):
+    """Return a pattern of a path, which has backslashes on Windows."""
+    return re.escape(str(path))
 
 
 @pytest.fixture(autouse=True)
@@ -246,7 +252,9 @@ def test_of_two_recordings_that_begin_at_once_neither_replaces_the_other(tmp_pat
     assert first.save() == [path]
     content = path.read_bytes()
     other = tmp_path / "user" / "recordings" / path.name
-    with pytest.raises(OutputError, match=f"written it meanwhile; the recording is in {other}"):
+    with pytest.raises(
+        OutputError, match=f"written it meanwhile; the recording is in {literal(other)}"
+    ):
         second.save()
     assert path.read_bytes() == content
     np.testing.assert_array_equal(Motion.load(other).trans, Motion.load(path).trans)
@@ -408,7 +416,9 @@ def test_a_full_disk_at_the_end_leaves_the_recording_in_a_second_place(tmp_path,
     recording, _ = recorded(path.parent, body)
     refusing(monkeypatch, path.parent)
     other = tmp_path / "user" / "recordings" / path.name
-    with pytest.raises(journal.OutputError, match=f"No space.*; the recording is in {other}"):
+    with pytest.raises(
+        journal.OutputError, match=f"No space.*; the recording is in {literal(other)}"
+    ):
         recording.save()
     assert_same(other, truth)
     assert path.read_bytes() == EARLIER
@@ -437,7 +447,7 @@ def test_when_every_place_refuses_the_growing_file_stays_and_is_named(tmp_path, 
     with monkeypatch.context() as patch:
         refusing(patch, tmp_path)
         file = tmp_path / "full" / "take.recording"
-        with pytest.raises(journal.OutputError, match=f"finish it with scope live {file}"):
+        with pytest.raises(journal.OutputError, match=f"finish it with scope live {literal(file)}"):
             recording.save()
     release(lock_of(file))  # as the end of the process does
     assert main(["live", str(file), "--record", str(path), "--quiet"]) == 0
