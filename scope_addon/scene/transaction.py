@@ -56,13 +56,14 @@ def all_or_nothing(
     re-raise.
 
     :param objects: the block may change their keys, action, parent, transform and custom
-        properties, and the custom properties of their bones.
+        properties, the custom properties of their bones, and the animation of a camera's lens.
     :param keys: shape keys whose keyframes, action and values it may change.
     :param actions: further ones whose content it may change, whatever uses them.
     """
     unique = list(dict.fromkeys(objects))
+    lenses = {obj.data for obj in unique if obj.type == "CAMERA" and obj.data.library is None}
     animated: list[_SavedAnimation | _SavedAction] = [
-        *(_SavedAnimation(owner) for owner in (*unique, *keys)),
+        *(_SavedAnimation(owner) for owner in (*unique, *lenses, *keys)),
         *map(_SavedAction, actions),
     ]
     values = [(block, block.value) for key in keys for block in key.key_blocks]
@@ -175,9 +176,11 @@ class _SavedAction:
 
 
 class _SavedAnimation:
-    """The action assigned to an object or shape keys, with its content; the ends of its strips."""
+    """The action assigned to an object, a lens or shape keys, with its content; the ends of its
+    strips.
+    """
 
-    def __init__(self, obj: bpy.types.Object | bpy.types.Key) -> None:
+    def __init__(self, obj: bpy.types.Object | bpy.types.Camera | bpy.types.Key) -> None:
         self._obj = obj
         data = obj.animation_data
         self._had_data = data is not None

@@ -16,6 +16,7 @@ from scope.scope_addon.scene.actions import (
     rewrite_keys,
 )
 from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.timing import Retiming, retime_strip, strip_ends
 from scope.scope_addon.scene.transaction import all_or_nothing, restore_content
 
 
@@ -118,6 +119,27 @@ def test_an_object_without_animation_has_none_after_a_rollback(person):
     with pytest.raises(MemoryError):
         fail_after(lambda: another_action(empty), empty, empty)
     assert empty.animation_data is None
+
+
+def test_the_zoom_of_a_camera_in_the_nla_is_where_it_was_after_a_rollback():
+    lens = bpy.data.cameras.new("camera")
+    camera = bpy.data.objects.new("camera", lens)
+    bpy.context.scene.collection.objects.link(camera)
+    for frame in (10, 50):
+        lens.lens = frame
+        lens.keyframe_insert("lens", frame=frame)
+    animation = lens.animation_data
+    strip = animation.nla_tracks.new().strips.new("zoom", 10, animation.action)
+    animation.action = None
+
+    def fail():
+        with all_or_nothing(bpy.context.scene, camera):
+            retime_strip(strip, Retiming(1.0, 2.0))
+            assert strip_ends(strip) != [10.0, 50.0, 10.0, 50.0]
+            raise MemoryError
+
+    pytest.raises(MemoryError, fail)
+    assert strip_ends(strip) == [10.0, 50.0, 10.0, 50.0]
 
 
 def test_success_keeps_the_changes_and_leaves_no_copies(person):
