@@ -40,9 +40,7 @@ REPEATED_STEP = 0.3
 REPEATED_SHARE = 0.15  # of the frames
 FEWEST_STEPS = 20
 SURE_KEYPOINT = 0.5  # confidence
-FILM_RATES = (24.0, 25.0, 30.0, 50.0)  # frames per second that footage is converted from
-NTSC_OFF = 0.01  # frames per second, to which 1.001 times the rate is a whole number
-SAME_RATE = 0.1  # relative, within which one of these is meant
+REPEATS_OFF = 0.15  # error of the mean number of frames that show one moment
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen
 
 
@@ -216,14 +214,9 @@ def repetition_warnings(name: str, fps: float, motion: Motion) -> list[Notice]:
     repeats = (moved_px < REPEATED_STEP * around_px)[is_seen].mean()
     if repeats < REPEATED_SHARE:
         return []
-    shown = fps * (1.0 - repeats)
-    # of 29.97, it is 23.976: at 24, other frames would repeat
-    slower = 1.001 if abs(1.001 * fps - round(1.001 * fps)) < NTSC_OFF else 1.0
-    usual = [*(rate / slower for rate in FILM_RATES), *(fps / k for k in range(2, 9))]
-    rate = min(usual, key=lambda each: abs(each - shown))
-    if abs(rate - shown) > SAME_RATE * shown:
-        rate = round(shown)
-    return [notice("repeated_frames", footage=name, percent=100.0 * repeats, rate=float(rate))]
+    # Every k-th frame shows another moment than the one before; a rate between would repeat some.
+    every = max(2, int(np.ceil(1.0 / (1.0 - repeats) - REPEATS_OFF)))
+    return [notice("repeated_frames", footage=name, percent=100.0 * repeats, rate=fps / every)]
 
 
 def unused_option_warnings(video: Video, options: CaptureOptions) -> list[Notice]:

@@ -254,11 +254,16 @@ def filmed(motion, shown, noise_px=0.3):
     + [(29.97, 23.976), (59.94, 29.97)],
 )
 def test_frames_that_repeat_the_one_before_are_said(motion, fps, shown_fps):
-    """Of a video converted from a lower rate, usual or not."""
+    """Of a video converted from a lower rate, usual or not; at the rate that is proposed, no frame
+    repeats, and no lower one divides the frames so.
+    """
     shown = np.floor(np.arange(120) / fps * shown_fps + 1e-6) * fps / shown_fps
     (warning,) = repetition_warnings("a.mp4", fps, filmed(motion, shown))
     assert warning.code == "repeated_frames"
-    assert warning.values["rate"] == pytest.approx(shown_fps, rel=1e-4)
+    every = round(fps / warning.values["rate"])
+    assert warning.values["rate"] == pytest.approx(fps / every)
+    assert (np.diff(shown[::every]) > 1e-6).all()
+    assert every - 1 < fps / shown_fps + 1e-3
 
 
 @pytest.mark.parametrize("shown", [np.arange(120), np.zeros(120), np.r_[:60, [59] * 15, 60:105]])
