@@ -50,6 +50,7 @@ ALONG = 15.5
 ACROSS = 11.5
 _RATE_HZ = 60.0
 _EXPONENT = 0.3
+SURFACE_ROUNDS = 2  # at most, as what comes out of one part of the body may enter the next
 _MIN_HZ = 10.0  # acceleration hardly couples frames that are further apart
 
 
@@ -107,9 +108,11 @@ class _Clip:
             found = window.fit(every, better, quadratic)
         resting = window.with_resting_places(found)
         outside, entered = resting.with_body_surface(found, self._surface)
-        if entered:  # what comes out of one part may enter the next
+        for _ in range(SURFACE_ROUNDS):
+            if not entered:
+                break
             found = outside.fit(every, found.states, robust)
-            outside, _ = resting.with_body_surface(found, self._surface)
+            outside, entered = resting.with_body_surface(found, self._surface)
         self._keep(frames, outside.fit(every, found.states, robust, covariance=True))
 
     def fitted(self) -> FittedTrack:
