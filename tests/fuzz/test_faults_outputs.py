@@ -80,7 +80,7 @@ def test_an_export_is_the_old_or_the_new_one(tmp_path, temporary, small, motion,
     objects = len(bpy.data.objects), len(bpy.data.scenes)
     path.write_bytes(OLD)
     said = []
-    for n in some_of(len(calls), 40 if suffix == ".bvh" else 5):
+    for n in some_of(len(calls), 40 if suffix == ".bvh" else 9):
         with failing(n):
             try:
                 export_motions([motion], small, path, export_options=ExportOptions(shape="baked"))
