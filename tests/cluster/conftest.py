@@ -34,9 +34,13 @@ def started(**options: Any) -> AbstractContextManager[Any]:
     return package("distributed").LocalCluster(n_workers=2, **defaults | options)
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    """Two worker processes; one that a test kills is started again."""
+    """Two worker processes; one that a test kills is started again.
+
+    They end with the tests of a file: those of a package end with the whole run, and Dask's threads
+    beside Blender's module crashed it, and met the faults of other tests.
+    """
     with started() as cluster:
         yield cluster
 

@@ -8,6 +8,7 @@ import errno
 import io
 import os
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -46,13 +47,17 @@ class _File:
 
 @contextmanager
 def failing(n: int, without: tuple[str, ...] = ()) -> Iterator[list[int]]:
-    """Let the n-th call fail with a full disk; give a list of the calls so far.
+    """Let the n-th call fail with a full disk; give a list of the calls so far. Those of threads
+    that run already do not count.
 
     :param without: names of calls that do not count.
     """
     calls: list[int] = []
+    others = set(threading.enumerate()) - {threading.current_thread()}
 
     def count() -> None:
+        if threading.current_thread() in others:
+            return
         calls.append(len(calls))
         if len(calls) == n:
             raise OSError(errno.ENOSPC, "No space left on device")
