@@ -35,6 +35,7 @@ from ..tree import BodyArrays, Tree, make_tree
 from ..validation import check_type, warn_of_start
 from .initialize import initial_states
 from .misfit import (
+    COSTLY_IN_IMAGE,
     warn_of_mirrored_clip,
     warn_of_unlikely_shape,
     warn_of_wrong_pixels,
@@ -45,9 +46,6 @@ from .misfit import (
 # random people with deviations of 2 mm, all but six that have a twisted limb cost more; of all,
 # a tenth without noise and 61 % with it.
 _COSTLY = 1.3
-# The same of 2D keypoints alone: 8 % of 1,000 random people cost more, and of these a sixth are
-# another minimum.
-_COSTLY_IN_IMAGE = 1.2
 _HALF_TURN = np.diag([-1.0, 1.0, -1.0])
 # Deviations of 3D keypoints, metres, in the early stages of the repeated start.
 _LOOSE_M = (0.03, 0.015)
@@ -199,7 +197,7 @@ class FrameSolver:
             if loose is not None:
                 best = _cheaper(best, run(starts[0], loose))
         is_image_alone = not (terms.flags & (HAS_3D | HAS_DIRECTION)).any()
-        if is_image_alone and len(starts) > 1 and best.cost > _COSTLY_IN_IMAGE * count:
+        if is_image_alone and len(starts) > 1 and best.cost > COSTLY_IN_IMAGE * count:
             # The body that the flipped image shows, turned round, is seen almost as the one that is
             # searched, from where no heading may lead.
             flipped = terms._replace(image=terms.image * [-1.0, 1.0, 1.0])

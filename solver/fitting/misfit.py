@@ -41,7 +41,7 @@ _FAR_IN_IMAGE = 0.02
 # at most 2 of 3D keypoints and 4 of 2D and 3D ones; of mirrored ones it is at least 3 and 7.
 _COSTLY_IN_SPACE = 3.0
 _COSTLY_TOGETHER = 6.0
-_COSTLY_IN_IMAGE = 1.2  # of 2D keypoints alone of people who stand; 8 % of right ones cost more
+COSTLY_IN_IMAGE = 1.2  # of 2D keypoints alone; 8 % of 1,000 right fits cost more
 _UPRIGHT = 0.5  # cosine of the angle between the root's vertical axis and the image's
 # by which the fit to what was given costs more than the other
 _FACTOR = 1.5
@@ -268,7 +268,7 @@ def warn_of_mirroring(
     elif not (in_image and is_person):
         return False
     elif _are_upright(R_camera_root):
-        is_bad = cost > _COSTLY_IN_IMAGE
+        is_bad = cost > COSTLY_IN_IMAGE
         remedies = [_FROM_THE_LEFT]
         factor = _FACTOR_FLIPPED
     else:
