@@ -289,7 +289,9 @@ def _check_rotations(rotations: Array) -> None:
     """Check matrices (..., 3, 3): two rows must be orthonormal, and the third their product. All
     inner products and the determinant take several times as long.
     """
-    first, second, third = np.moveaxis(rotations, -2, 0)
+    first = rotations[..., 0, :]
+    second = rotations[..., 1, :]
+    third = rotations[..., 2, :]
     off = np.abs(np.cross(first, second) - third).max(axis=-1)
     for a, b, product in ((first, first, 1.0), (second, second, 1.0), (first, second, 0.0)):
         off = np.maximum(off, np.abs(np.einsum("...i,...i", a, b) - product))

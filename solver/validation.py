@@ -621,7 +621,8 @@ def _first_elsewhere(indices: Array, rows: Array) -> int:
 
     :param rows: (n, C) coordinates and confidence; rows without a positive confidence do not count.
     """
-    n, last = rows.shape[0], rows.shape[1] - 1
+    n = rows.shape[0]
+    last = rows.shape[1] - 1
     is_rising = True
     for k in range(1, n):
         is_rising = is_rising and indices[k] > indices[k - 1]

@@ -42,7 +42,7 @@ FRAMES = 20
 RATE_HZ = 30.0  # of the recordings, too
 CLIP_SIGMA_PX = 4.0
 CLIP_SIGMA_M = 0.01
-FARTHEST_M = 1.0  # from where a clip begins; who goes farther may pass a camera
+FARTHEST_M = 1.0  # from where a clip begins: a person who walks farther may get behind a camera
 COSTLY = 1.5  # times the cost of a fit that starts from the truth: another minimum
 Array = NDArray[np.float64]
 

@@ -320,19 +320,15 @@ def _warnings_about_people(
     name = Path(video.path).name
     warnings = []
     if left_out:
-        are_brief = len(tracks) < most_people(options.people)
-        warnings.append(
-            notice(
-                "seen_briefly"
-                if are_brief
-                else "left_out"
-                if options.chosen is None
-                else "left_out_of_views",
-                footage=name,
-                others=len(left_out),
-                place=str(left_out[0]),
-            )
-        )
+        others = len(left_out)
+        place = str(left_out[0])
+        if len(tracks) < most_people(options.people):
+            said = notice("seen_briefly", footage=name, others=others, place=place)
+        elif options.chosen is None:
+            said = notice("left_out", footage=name, others=others, place=place)
+        else:
+            said = notice("left_out_of_views", footage=name, others=others, place=place)
+        warnings.append(said)
     turn_deg = needed_turn(tracks[0])
     if turn_deg:
         view = video.wanted.view

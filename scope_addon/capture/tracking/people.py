@@ -380,7 +380,8 @@ def without_glimpses(tracklets: Sequence[Tracklet], times: Sequence[float]) -> l
     for tracklet in tracklets:
         if not tracklet.rows:
             continue
-        first, last = tracklet.rows[0], tracklet.rows[-1]
+        first = tracklet.rows[0]
+        last = tracklet.rows[-1]
         seconds = times[last] - times[first] + step_s
         is_continued = last + 1 in begins or first - 1 in ends
         if is_continued or seconds > MIN_REAPPEARANCE_S - 0.5 * step_s:

@@ -205,11 +205,17 @@ def exchange_measurements(
         if names is None:
             continue
         at = read_keys(curve)[:, 0].astype(float)
-        old, new = (
-            np.interp(at, frames[np.isfinite(column)], column[np.isfinite(column)])
-            for column in (was[names], now[names])
-        )
+        old = _known_values_at(at, frames, was[names])
+        new = _known_values_at(at, frames, now[names])
         change_keys(curve, at[old != new], new[old != new])
+
+
+def _known_values_at(
+    at: NDArray[np.float64], frames: NDArray[np.float64], values: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return values (T,) at frames (T,) between those that are known, at frames (n,)."""
+    known = np.isfinite(values)
+    return np.interp(at, frames[known], values[known])
 
 
 def add_review_markers(
