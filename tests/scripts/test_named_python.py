@@ -119,3 +119,30 @@ def test_an_environment_of_another_python_than_the_named_one_is_said_and_kept(
     for python in (str(named), ""):
         done = run(program, "setup", python)
         assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("script", ["solver_environment", "site"])
+def test_an_environment_of_another_python_than_the_named_one_is_made_anew(
+    program: Path, script: str
+) -> None:
+    made = program / "build" / f"{script.removesuffix('_environment')}_environment" / "bin/python"
+    first = program / "first"
+    make_python(first, "3.11")
+    assert run(program, script, str(first)).returncode == 0
+    # One that cannot be used changes nothing, and is said.
+    named = program / "named"
+    make_python(named, "", 127)
+    done = run(program, script, str(named))
+    assert done.returncode == 1
+    assert str(named) in done.stderr
+    assert made.read_text() == first.read_text()
+    # Another path of the same version, and none at all, go on as before.
+    make_python(named, "3.11")
+    named.write_text(named.read_text() + "# at another path\n")
+    for python in (str(named), ""):
+        done = run(program, script, python)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert made.read_text() == first.read_text()
+    make_python(named, "3.13")
+    assert run(program, script, str(named)).returncode == 0
+    assert made.read_text() == named.read_text()
