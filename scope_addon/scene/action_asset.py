@@ -13,9 +13,9 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.errors import InputError
+from ..arrays import Float32Array, Float64Array
 from ..errors import UsageError
 from ..motion import Motion
 from ..review_spans import find_review_spans
@@ -157,11 +157,11 @@ def _radius(bone: bpy.types.PoseBone) -> float:
 
 
 def _skeleton_picture(
-    heads: NDArray[np.float64],
-    tails: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    colors: NDArray[np.float64],
-) -> NDArray[np.float32]:
+    heads: Float64Array,
+    tails: Float64Array,
+    radii: Float64Array,
+    colors: Float64Array,
+) -> Float32Array:
     """Draw bones as capsules on a transparent background.
 
     :param heads: (B, 3) metres, z up.
@@ -182,15 +182,15 @@ def _skeleton_picture(
     color = (blocks[..., :3] * blocks[..., 3:]).mean(axis=(1, 3)) / np.maximum(alpha, 1e-6)[
         ..., None
     ]
-    out: NDArray[np.float32] = np.concatenate(
-        [np.clip(color, 0.0, 1.0), alpha[..., None]], axis=2
-    ).astype(np.float32)
+    out: Float32Array = np.concatenate([np.clip(color, 0.0, 1.0), alpha[..., None]], axis=2).astype(
+        np.float32
+    )
     return out
 
 
 def _on_screen(
-    heads: NDArray[np.float64], tails: NDArray[np.float64], radii: NDArray[np.float64], size: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    heads: Float64Array, tails: Float64Array, radii: Float64Array, size: int
+) -> tuple[Float64Array, Float64Array, Float64Array]:
     """Return heads and tails (B, 3) in pixels right, up and towards the viewer, and radii (B,) in
     pixels.
     """
@@ -212,12 +212,12 @@ def _on_screen(
 
 
 def _draw_capsule(
-    picture: NDArray[np.float64],
-    depth: NDArray[np.float64],
-    start: NDArray[np.float64],
-    end: NDArray[np.float64],
+    picture: Float64Array,
+    depth: Float64Array,
+    start: Float64Array,
+    end: Float64Array,
     radius: float,
-    color: NDArray[np.float64],
+    color: Float64Array,
 ) -> None:
     """Draw where the capsule is nearer to the viewer than what is there.
 

@@ -19,6 +19,7 @@ import numpy as np
 from bpy_extras import anim_utils
 from numpy.typing import NDArray
 
+from ..arrays import Float32Array, Float64Array
 from ..errors import UsageError
 from .datablocks import changed, shape_keys_of
 
@@ -110,8 +111,8 @@ class Channels:
     def write(
         self,
         data_path: str,
-        frames: NDArray[np.float64],
-        values: NDArray[np.float64],
+        frames: Float64Array,
+        values: Float64Array,
         interpolation: str = "LINEAR",
         group: str = "",
     ) -> list[bpy.types.FCurve]:
@@ -197,16 +198,14 @@ def fcurves_of(action: bpy.types.Action) -> list[bpy.types.FCurve]:
     return [curve for strip in strips for bag in strip.channelbags for curve in bag.fcurves]
 
 
-def read_keys(curve: bpy.types.FCurve) -> NDArray[np.float32]:
+def read_keys(curve: bpy.types.FCurve) -> Float32Array:
     """Return (T, 2): frame and value of each key."""
     coordinates = np.empty(2 * len(curve.keyframe_points), np.float32)
     curve.keyframe_points.foreach_get("co", coordinates)
     return coordinates.reshape(-1, 2)
 
 
-def values_between_keys(
-    curve: bpy.types.FCurve, frames: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def values_between_keys(curve: bpy.types.FCurve, frames: Float64Array) -> Float64Array:
     """Evaluate a curve at frames (T,) as its keys and their repetition have it, without its other
     modifiers: these are added to whatever keys are written from the values.
     """
@@ -216,8 +215,8 @@ def values_between_keys(
 
 def rewrite_keys(
     curve: bpy.types.FCurve,
-    frames: NDArray[np.float64],
-    values: NDArray[np.float64],
+    frames: Float64Array,
+    values: Float64Array,
     interpolation: str = "LINEAR",
 ) -> None:
     """Replace the keys of a curve.
@@ -234,9 +233,7 @@ def rewrite_keys(
     curve.update()
 
 
-def change_keys(
-    curve: bpy.types.FCurve, frames: NDArray[np.float64], values: NDArray[np.float64]
-) -> None:
+def change_keys(curve: bpy.types.FCurve, frames: Float64Array, values: Float64Array) -> None:
     """Change the values of a curve's keys at some frames, and add those that are missing; other
     keys stay as they are.
 
@@ -260,7 +257,7 @@ def change_keys(
     curve.update()
 
 
-def _insert_keys(curve: bpy.types.FCurve, new: NDArray[np.float32]) -> None:
+def _insert_keys(curve: bpy.types.FCurve, new: Float32Array) -> None:
     """Insert keys (N, 2), frame and value, in linear time: Blender moves all later ones for each
     key that it inserts.
 
@@ -468,7 +465,7 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
 
 def shape_key_values(
     scene: bpy.types.Scene, shaped: Iterable[bpy.types.Key], frames: range
-) -> dict[bpy.types.Key, NDArray[np.float32]]:
+) -> dict[bpy.types.Key, Float32Array]:
     """Return the values (T, keys), without the basis, that shape keys show at T scene frames."""
     shown = {keys: np.empty((len(frames), len(keys.key_blocks) - 1), np.float32) for keys in shaped}
     for row, frame in enumerate(frames if shown else ()):
@@ -479,7 +476,7 @@ def shape_key_values(
     return shown
 
 
-def key_shape_keys(keys: bpy.types.Key, frames: range, values: NDArray[np.float32]) -> None:
+def key_shape_keys(keys: bpy.types.Key, frames: range, values: Float32Array) -> None:
     """Give shape keys an action with the values of ``shape_key_values``."""
     channels = Channels(keys, bpy.data.actions.new(keys.name))
     for name, column in zip(keys.key_blocks.keys()[1:], values.T, strict=True):

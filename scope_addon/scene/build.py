@@ -13,9 +13,9 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
+from ..arrays import BoolArray, Float64Array
 from ..errors import MotionFileError, UsageError
 from ..footage import display_text
 from ..kinematics.face import body_with_mouth, expressions_of
@@ -100,8 +100,8 @@ class Person:
     mesh: bpy.types.Object
     camera: bpy.types.Object | None
     motion: Motion = field(repr=False)
-    frames: NDArray[np.float64] = field(repr=False)  # (T,) scene frame of each pose
-    under_floor: NDArray[np.bool_] = field(repr=False)  # (T,) poses with a foot under the floor
+    frames: Float64Array = field(repr=False)  # (T,) scene frame of each pose
+    under_floor: BoolArray = field(repr=False)  # (T,) poses with a foot under the floor
 
 
 @dataclass

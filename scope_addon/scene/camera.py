@@ -28,9 +28,9 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.rotations import quaternion_from_matrix
+from ..arrays import Float64Array
 from ..errors import VideoError
 from ..exif import picture_view
 from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from, picture_slots
@@ -94,7 +94,7 @@ def set_resolution(scene: bpy.types.Scene, owner: bpy.types.ID) -> None:
 
 
 def build_camera(
-    name: str, motion: Motion, collection: bpy.types.Collection, frames: NDArray[np.float64]
+    name: str, motion: Motion, collection: bpy.types.Collection, frames: Float64Array
 ) -> bpy.types.Object:
     """Create a camera object with the intrinsics and the pose of the footage's camera.
 
@@ -126,7 +126,7 @@ def build_view(
     motion: Motion,
     number: int,
     collection: bpy.types.Collection,
-    frames: NDArray[np.float64],
+    frames: Float64Array,
 ) -> bpy.types.Object:
     """Create the camera object of a further camera of a motion.
 
@@ -179,7 +179,7 @@ def same_camera(a: Motion, b: Motion) -> bool:
 
 
 def show_footage(
-    camera: bpy.types.Object, footage: str | Path, motion: Motion, frames: NDArray[np.float64]
+    camera: bpy.types.Object, footage: str | Path, motion: Motion, frames: Float64Array
 ) -> list[Notice]:
     """Show the footage as the camera's background, in step with the poses.
 
@@ -259,7 +259,7 @@ def _show_picture(
     background: bpy.types.CameraBackgroundImage,
     path: Path,
     motion: Motion,
-    frames: NDArray[np.float64],
+    frames: Float64Array,
 ) -> tuple[tuple[int, int], list[Notice]]:
     """Show a picture, or numbered ones; return the size in pixels, and warnings."""
     background.source = "IMAGE"
@@ -275,7 +275,7 @@ def _show_clip(
     background: bpy.types.CameraBackgroundImage,
     path: Path,
     motion: Motion,
-    frames: NDArray[np.float64],
+    frames: Float64Array,
 ) -> tuple[tuple[int, int], list[Notice]]:
     """Show footage of a distorting lens; return the size in pixels, and warnings."""
     # Always a new clip, because another capture may have another start or lens.
@@ -294,7 +294,7 @@ def _show_clip(
 
 
 def show_footage_again(
-    camera: bpy.types.Object, motion: Motion, frames: NDArray[np.float64]
+    camera: bpy.types.Object, motion: Motion, frames: Float64Array
 ) -> list[Notice]:
     """Show the camera's footage in step with poses that were moved in time; keep how opaque it is.
 
@@ -330,15 +330,15 @@ def show_footage_again(
     return warnings
 
 
-def _frames_by_time(motion: Motion, clip: bpy.types.MovieClip) -> NDArray[np.float64]:
+def _frames_by_time(motion: Motion, clip: bpy.types.MovieClip) -> Float64Array:
     """Return the frame (T,) of a video that each pose was seen in, as Blender counts: by the time
     and the video's rate, so that frames which the file lacks count, too.
     """
-    counted: NDArray[np.float64] = motion.footage_times_s * clip.fps
+    counted: Float64Array = motion.footage_times_s * clip.fps
     return counted
 
 
-def _start(shown: NDArray[np.float64], frames: NDArray[np.float64]) -> int:
+def _start(shown: Float64Array, frames: Float64Array) -> int:
     """Return the scene frame of the footage's first frame, which need not be captured, if the rates
     are the same.
 
@@ -348,7 +348,7 @@ def _start(shown: NDArray[np.float64], frames: NDArray[np.float64]) -> int:
     return round(float(frames[0] - shown[0]))
 
 
-def _drift(shown: NDArray[np.float64], frames: NDArray[np.float64]) -> float:
+def _drift(shown: Float64Array, frames: Float64Array) -> float:
     """Return how many frames the poses deviate from footage of which each scene frame shows the
     next frame; the parameters are those of `_start`.
     """
@@ -360,7 +360,7 @@ def _show_video(
     background: bpy.types.CameraBackgroundImage,
     path: Path,
     motion: Motion,
-    frames: NDArray[np.float64],
+    frames: Float64Array,
 ) -> tuple[tuple[int, int], list[Notice]]:
     """Show a video as an image, whose frame is keyed unless each frame of the scene shows the next
     one.
@@ -392,7 +392,7 @@ def _show_picture_sequence(
     background: bpy.types.CameraBackgroundImage,
     first: Path,
     motion: Motion,
-    frames: NDArray[np.float64],
+    frames: Float64Array,
 ) -> list[Notice]:
     """Show numbered pictures in step with the poses, from the first one on; return warnings.
 
@@ -419,8 +419,8 @@ def _show_picture_sequence(
 def _key_footage(
     camera: bpy.types.Object,
     background: bpy.types.CameraBackgroundImage,
-    scene_frames: NDArray[np.float64],
-    shown: NDArray[np.float64],
+    scene_frames: Float64Array,
+    shown: Float64Array,
 ) -> None:
     """Key the background image to show the frames ``shown`` (counted from 0) at ``scene_frames``,
     both (N,).
@@ -485,7 +485,7 @@ def _set_lens_distortion(
     background.clip_user.use_render_undistorted = True
 
 
-def blender_camera_matrix(world_from_camera: NDArray[np.float64]) -> NDArray[np.float64]:
+def blender_camera_matrix(world_from_camera: Float64Array) -> Float64Array:
     """Convert the pose of an OpenCV camera to that of a Blender camera object with the same view.
 
     ``world_from_blendcam = world_from_camera · diag(R_camera_blendcam, 1)``.
@@ -498,7 +498,7 @@ def blender_camera_matrix(world_from_camera: NDArray[np.float64]) -> NDArray[np.
     return np.asarray(world_from_camera) @ camera_from_blendcam
 
 
-def blender_brown_distortion(dist: NDArray[np.float64]) -> tuple[float, float, float, float, float]:
+def blender_brown_distortion(dist: Float64Array) -> tuple[float, float, float, float, float]:
     """Convert OpenCV's (k1, k2, p1, p2, k3) to the coefficients k1, k2, k3, p1, p2 of Blender's
     Brown model.
 

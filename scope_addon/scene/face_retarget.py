@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 from mathutils import Matrix
-from numpy.typing import NDArray
 
+from ..arrays import Float64Array
 from ..errors import UsageError
 from ..kinematics.face import EXPRESSIONS
 from ..notices import Notice, notice
@@ -59,8 +59,8 @@ class CapturedExpressions:
     frames (T,), and whether they repeat.
     """
 
-    frames: NDArray[np.float64]
-    weights: NDArray[np.float64]
+    frames: Float64Array
+    weights: Float64Array
     repeat: bool = False
 
 
@@ -176,7 +176,7 @@ def driven_keys(
 def _write(
     keys: bpy.types.Key,
     captured: CapturedExpressions,
-    values: dict[str, NDArray[np.float64]],
+    values: dict[str, Float64Array],
     source: str,
 ) -> tuple[bpy.types.Action, bpy.types.Action | None]:
     """Write the keys of one mesh; return the new action and the former one."""
@@ -202,8 +202,8 @@ class FaceKeys:
     (1, n) or (T, n); and whether they repeat.
     """
 
-    frames: NDArray[np.float64]  # (T,)
-    controls: dict[str, dict[str, NDArray[np.float64]]]
+    frames: Float64Array  # (T,)
+    controls: dict[str, dict[str, Float64Array]]
     repeat: bool = False
 
 
@@ -311,7 +311,7 @@ def rest_face(rig: bpy.types.Object, keys: FaceKeys) -> None:
             rig.pose.bones[bone].matrix_basis = Matrix()
 
 
-def _channels(rig: bpy.types.Object, motion: BoneMotion) -> dict[str, NDArray[np.float64]]:
+def _channels(rig: bpy.types.Object, motion: BoneMotion) -> dict[str, Float64Array]:
     """Return the values (T, n) of a control's channels; (1, n) of those that do not move, and none
     of those at rest.
     """

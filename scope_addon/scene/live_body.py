@@ -14,14 +14,12 @@ make Blender deform the mesh of shape β as SMPL does: bone i maps a vertex v to
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
+from ..arrays import Float64Array, FloatArray
 from ..kinematics.axes import R_WORLD_MODEL
 from .character import armature, body_mesh
 from .character.animation import quaternion_product
@@ -51,15 +49,15 @@ class LiveBody:
         return found("objects", *self._armature)
 
     @property
-    def betas(self) -> NDArray[np.float64]:
+    def betas(self) -> Float64Array:
         """The shape (P,) that is shown."""
         return self._betas
 
     def show(
         self,
-        rotations: NDArray[np.float64],
-        pelvis: NDArray[np.float64],
-        betas: NDArray[np.floating[Any]],
+        rotations: Float64Array,
+        pelvis: Float64Array,
+        betas: FloatArray,
     ) -> bool:
         """Pose the body; return whether it was created for this.
 
@@ -117,7 +115,7 @@ class LiveBody:
         self._blocks = set()
         armature.remove_unused_ring()
 
-    def _create(self, betas: NDArray[np.float64]) -> tuple[bpy.types.Object, bpy.types.Object]:
+    def _create(self, betas: Float64Array) -> tuple[bpy.types.Object, bpy.types.Object]:
         """Create the objects, in place of what is left of former ones.
 
         :raises UsageError: the scene was removed.
@@ -154,8 +152,8 @@ class LiveBody:
         return rig, mesh
 
     def _channels(
-        self, rotations: NDArray[np.float64], pelvis: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        self, rotations: Float64Array, pelvis: Float64Array
+    ) -> tuple[Float64Array, Float64Array]:
         """Return the quaternions (K+1, 4) and locations (K+1, 3) of the bones, in the order of the
         joints.
         """

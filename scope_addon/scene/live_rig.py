@@ -9,15 +9,14 @@ Rigify rig are not posed: its limbs are switched to FK.
 from __future__ import annotations
 
 import time
-from typing import Any
 
 import bpy
 import numpy as np
 from mathutils import Matrix
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
+from ..arrays import Float64Array, FloatArray
 from ..edit.clip import Clip
 from ..retarget.bone_map import BoneMap
 from ..retarget.skeleton import basis
@@ -95,9 +94,9 @@ class LiveRig:
 
     def show(
         self,
-        rotations: NDArray[np.float64],
-        pelvis: NDArray[np.float64],
-        betas: NDArray[np.floating[Any]],
+        rotations: Float64Array,
+        pelvis: Float64Array,
+        betas: FloatArray,
     ) -> None:
         """Pose the rig.
 
@@ -118,9 +117,7 @@ class LiveRig:
         turns = basis(self._skeleton, self._turn @ pose.rotations)[0]
         self._write(rig, turns, (heads[0] - self._rest) @ self._location)
 
-    def _write(
-        self, rig: bpy.types.Object, turns: NDArray[np.float64], location: NDArray[np.float64]
-    ) -> None:
+    def _write(self, rig: bpy.types.Object, turns: Float64Array, location: Float64Array) -> None:
         """Set the channels of the mapped bones that still exist, each in its own rotation mode;
         their scale is 1.
 
@@ -156,7 +153,7 @@ class LiveRig:
         bones.foreach_set("scale", scales.ravel())
         rig.update_tag(refresh={"DATA"})
 
-    def _transfer_of(self, betas: NDArray[np.floating[Any]]) -> Transfer:
+    def _transfer_of(self, betas: FloatArray) -> Transfer:
         """Return the transfer for a shape, or for a slightly older one."""
         now_s = time.monotonic()
         is_due = np.abs(betas - self._betas).max(initial=0.0) > _MIN_CHANGE and now_s > self._due_s

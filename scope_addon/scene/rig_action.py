@@ -9,9 +9,9 @@ from collections.abc import Iterable
 import bpy
 import numpy as np
 from mathutils import Matrix
-from numpy.typing import NDArray
 
 from ...solver.rotations import quaternion_from_matrix
+from ..arrays import Float64Array
 from ..retarget.skeleton import BoneMotion, Skeleton
 from .actions import Channels, bone_path, fcurves_of, nla_strips, read_keys
 from .character.animation import on_one_hemisphere
@@ -26,11 +26,11 @@ _OFFSETS = {"location": 0.0, "scale": 1.0}
 
 def root_locations(
     rig: bpy.types.Object,
-    place: NDArray[np.float64],
+    place: Float64Array,
     skeleton: Skeleton,
     root: int,
-    heads: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    heads: Float64Array,
+) -> Float64Array:
     """Return the location channel (T, 3) of the root bone.
 
     :param place: (4, 4) the rig's object to world at rest.
@@ -38,12 +38,12 @@ def root_locations(
     :param heads: (T, 3) positions of the root bone's head, metres, in the world at rest.
     """
     world = place[:3, :3]
-    moved: NDArray[np.float64] = (heads - skeleton.heads[root]) @ np.linalg.inv(world).T
+    moved: Float64Array = (heads - skeleton.heads[root]) @ np.linalg.inv(world).T
     # not by the bone's axes in the world, which a scale of three factors shears
     return moved @ location_axes(rig.data.bones[skeleton.names[root]])
 
 
-def location_axes(bone: bpy.types.Bone) -> NDArray[np.float64]:
+def location_axes(bone: bpy.types.Bone) -> Float64Array:
     """Return the axes (3, 3) of a bone's location channel at rest as columns, in the armature's
     space: its own, or, without *Local Location*, those of its parent.
     """
@@ -52,7 +52,7 @@ def location_axes(bone: bpy.types.Bone) -> NDArray[np.float64]:
 
 
 def write_action(
-    rig: bpy.types.Object, keys: list[BoneMotion], frames: NDArray[np.float64], source: str
+    rig: bpy.types.Object, keys: list[BoneMotion], frames: Float64Array, source: str
 ) -> bpy.types.Action:
     """Create a new action with the keys, in the rotation mode of each bone.
 
@@ -180,7 +180,7 @@ def _checksum(action: bpy.types.Action) -> str:
     return found.hexdigest()
 
 
-def channel_of_rotation(mode: str, R: NDArray[np.float64]) -> tuple[str, NDArray[np.float64]]:
+def channel_of_rotation(mode: str, R: Float64Array) -> tuple[str, Float64Array]:
     """Return the data path and the values (T, n) of rotations (T, 3, 3) in a bone's rotation
     mode.
     """

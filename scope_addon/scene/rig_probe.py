@@ -16,10 +16,10 @@ from contextlib import AbstractContextManager, contextmanager
 import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion
-from numpy.typing import NDArray
 
 from ...solver.errors import InputError
 from ...solver.rotations import log
+from ..arrays import BoolArray, Float64Array, IndexArray
 from ..notices import Notice, notice
 from ..retarget.bone_map import PHALANGES, check_bone_count
 from ..retarget.fingers import bone_ends
@@ -96,7 +96,7 @@ def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
 
 
 def _check_carried(
-    rig: bpy.types.Object, names: list[str], carriers: NDArray[np.intp], parts: dict[str, str]
+    rig: bpy.types.Object, names: list[str], carriers: IndexArray, parts: dict[str, str]
 ) -> None:
     """Check that every limb moves as one piece with the pelvis; goals of IK, for example, do not.
 
@@ -121,8 +121,8 @@ def _check_carried(
 
 
 def _dependencies(
-    rig: bpy.types.Object, parts: dict[str, str], rest: NDArray[np.float64]
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    rig: bpy.types.Object, parts: dict[str, str], rest: Float64Array
+) -> tuple[BoolArray, BoolArray]:
     """Rotate each bone and observe the others, in the armature's space: the object may shear them.
 
     :param rest: (B, 4, 4) bones to world at rest.
@@ -171,7 +171,7 @@ def _independent(parts: dict[str, str]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _nearest(above: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _nearest(above: BoolArray) -> IndexArray:
     """Return the last preceding bone that each bone depends on (B,), -1 for none.
 
     :param above: (B, B) whether the row's bone depends on the column's.
@@ -196,7 +196,7 @@ def _floor(rig: bpy.types.Object, rest: RestPose, parts: dict[str, str]) -> floa
     return float(origin if abs(lowest - origin) < _MAX_LIFT * rest.size else lowest)
 
 
-def _check_rotated(rig: bpy.types.Object, names: list[str], turned: NDArray[np.float64]) -> None:
+def _check_rotated(rig: bpy.types.Object, names: list[str], turned: Float64Array) -> None:
     """Check that the probe rotated these bones; other bones at rest would seem to follow one that
     did not.
 
@@ -246,8 +246,8 @@ def _check_root_moves(rig: bpy.types.Object, name: str) -> None:
 def blocked_bones(
     rig: bpy.types.Object,
     keys: Sequence[BoneMotion],
-    wanted: NDArray[np.float64],
-    heads: NDArray[np.float64],
+    wanted: Float64Array,
+    heads: Float64Array,
 ) -> list[Notice]:
     """Return warnings about bones that deviate from the motion although they can be moved, such as
     a leg with IK.
@@ -332,7 +332,7 @@ def _leaves_rest(curve: bpy.types.FCurve) -> bool:
     return not is_keyed or bool(np.abs(values - rest[curve.array_index]).max() > _VISIBLE)
 
 
-def _farthest_frames(keys: Sequence[BoneMotion], path: NDArray[np.float64]) -> list[int]:
+def _farthest_frames(keys: Sequence[BoneMotion], path: Float64Array) -> list[int]:
     """Return the frames to look at: the first one, and those in which bones turn farthest about
     each of their axes, or the root bone is farthest in each direction; a frame may do for several.
 
@@ -363,17 +363,17 @@ def basis_of(key: BoneMotion, t: int) -> Matrix:
     return matrix
 
 
-def _matrices(rig: bpy.types.Object, names: list[str]) -> NDArray[np.float64]:
+def _matrices(rig: bpy.types.Object, names: list[str]) -> Float64Array:
     """Return the evaluated bones to world (B, 4, 4)."""
     bpy.context.view_layer.update()
     posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
     return np.array([posed.matrix_world @ posed.pose.bones[name].matrix for name in names], float)
 
 
-def _rotations(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rotations(matrices: Float64Array) -> Float64Array:
     """Return the rotations (B, 3, 3) of matrices (B, 4, 4), without scale."""
     U, _, Vt = np.linalg.svd(matrices[:, :3, :3])
-    rotations: NDArray[np.float64] = U @ Vt
+    rotations: Float64Array = U @ Vt
     return rotations
 
 
@@ -457,15 +457,15 @@ def rest_pose(rig: bpy.types.Object, *, with_skin: bool = False) -> RestPose:
     return RestPose(names, parents, heads, tails, np.concatenate(points), np.concatenate(owners))
 
 
-def _placed(points: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def _placed(points: Float64Array, matrix: Float64Array) -> Float64Array:
     """Return points (n, 3) under a matrix (4, 4)."""
-    placed: NDArray[np.float64] = points @ matrix[:3, :3].T + matrix[:3, 3]
+    placed: Float64Array = points @ matrix[:3, :3].T + matrix[:3, 3]
     return placed
 
 
 def _owners(
     mesh: bpy.types.Object, rig: bpy.types.Object, row: dict[str, int]
-) -> NDArray[np.intp] | None:
+) -> IndexArray | None:
     """Return the bone that moves each vertex most (V,), -1 for none; None if the rig does not move
     the mesh.
     """

@@ -6,15 +6,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from typing import Any
 
 import bpy
 import numpy as np
 from mathutils import Matrix
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.errors import InputError
+from ..arrays import Float64Array, FloatArray
 from ..edit.clip import Clip
 from ..edit.root_motion import about_z, floor_trajectory
 from ..errors import UsageError
@@ -105,10 +104,10 @@ class RetargetResult:
 class _PlacedMotion:
     """The rig's motion in the world, with root motion as the user chose."""
 
-    rotations: NDArray[np.float64]  # (T, B, 3, 3) bone to world, or to the root object
-    heads: NDArray[np.float64]  # (T, 3) of the root bone, metres
+    rotations: Float64Array  # (T, B, 3, 3) bone to world, or to the root object
+    heads: Float64Array  # (T, 3) of the root bone, metres
     # Positions (T, 3), metres, and angles (T,) about the vertical, radians, of the root object.
-    trajectory: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    trajectory: tuple[Float64Array, Float64Array] | None = None
 
 
 def guess_bone_map(rig: bpy.types.Object) -> BoneMap:
@@ -156,9 +155,9 @@ def map_notices(rig: bpy.types.Object, bone_map: BoneMap) -> list[Notice]:
     return notices
 
 
-def _heads_at_rest(rig: bpy.types.Object, bone_map: BoneMap) -> dict[str, NDArray[np.float64]]:
+def _heads_at_rest(rig: bpy.types.Object, bone_map: BoneMap) -> dict[str, Float64Array]:
     """Return the head (3,) of the first bone of each part at rest, in the world, metres."""
-    heads: dict[str, NDArray[np.float64]] = {}
+    heads: dict[str, Float64Array] = {}
     for bone, part in bone_map.parts.items():
         if bone in rig.data.bones and part not in heads:
             heads[part] = np.array(rig.matrix_world @ rig.data.bones[bone].head_local)
@@ -168,7 +167,7 @@ def _heads_at_rest(rig: bpy.types.Object, bone_map: BoneMap) -> dict[str, NDArra
 def retarget(
     source: bpy.types.Object,
     body: Body,
-    betas: NDArray[np.floating[Any]],
+    betas: FloatArray,
     rig: bpy.types.Object,
     bone_map: BoneMap,
     rate: float,
@@ -255,7 +254,7 @@ def retarget(
 
 def common_travel(
     body: Body,
-    people_betas: Sequence[NDArray[np.floating[Any]]],
+    people_betas: Sequence[FloatArray],
     rig: bpy.types.Object,
     bone_map: BoneMap,
 ) -> float:
@@ -320,10 +319,10 @@ def _with_parts(bone_map: BoneMap, kept: set[str]) -> BoneMap:
 
 
 def _placed(
-    places: NDArray[np.float64],
+    places: Float64Array,
     clip: Clip,
     skeleton: Skeleton,
-    place: NDArray[np.float64],
+    place: Float64Array,
     pose: Pose,
     root: int,
     options: RetargetOptions,
@@ -351,8 +350,8 @@ def _placed(
 
 
 def _with_source_transform(
-    places: NDArray[np.float64], rotations: NDArray[np.float64], heads: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    places: Float64Array, rotations: Float64Array, heads: Float64Array
+) -> tuple[Float64Array, Float64Array, Float64Array]:
     """Apply the position and rotation of the captured armature in the scene.
 
     :param places: (T, 4, 4) or (1, 4, 4) from `_places`.
@@ -368,9 +367,7 @@ def _with_source_transform(
     return R[:, None] @ rotations, (R @ heads[..., None])[..., 0] + position, angles
 
 
-def _back_above_root_object(
-    rig: bpy.types.Object, frames: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _back_above_root_object(rig: bpy.types.Object, frames: Float64Array) -> Float64Array:
     """Return `_back` of the parents above the rig's root object, from which ``at_rest`` detaches
     it.
     """
@@ -380,7 +377,7 @@ def _back_above_root_object(
     return _back(np.array(parent_transform(empty), float), _places(rig, frames))
 
 
-def _back(place: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+def _back(place: Float64Array, places: Float64Array) -> Float64Array:
     """Return the transforms, (T, 4, 4) or (1, 4, 4), that undo how parents move a rig; the identity
     where they scale it to nothing.
 
@@ -394,8 +391,8 @@ def _back(place: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np
 
 
 def _below(
-    trajectory: tuple[NDArray[np.float64], NDArray[np.float64]] | None, back: NDArray[np.float64]
-) -> NDArray[np.float64]:
+    trajectory: tuple[Float64Array, Float64Array] | None, back: Float64Array
+) -> Float64Array:
     """Return what has the effect of ``back`` where it is applied below a root object that follows
     the trajectory instead of above it.
 
@@ -410,7 +407,7 @@ def _below(
     return np.linalg.inv(root) @ back @ root
 
 
-def _moved_back(motion: _PlacedMotion, back: NDArray[np.float64]) -> _PlacedMotion:
+def _moved_back(motion: _PlacedMotion, back: Float64Array) -> _PlacedMotion:
     """Return the motion as it is to be keyed under parents that move the rig, so that the root bone
     is where it was in the world, and every bone turned as it was.
 
@@ -421,7 +418,7 @@ def _moved_back(motion: _PlacedMotion, back: NDArray[np.float64]) -> _PlacedMoti
     return replace(motion, rotations=R[:, None] @ motion.rotations, heads=heads)
 
 
-def _places(source: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+def _places(source: bpy.types.Object, frames: Float64Array) -> Float64Array:
     """Return the transform of the captured armature, or of a rig ``at_rest``, to the world at scene
     frames (T,), (T, 4, 4); (1, 4, 4) if it does not move.
 
@@ -444,7 +441,7 @@ def _places(source: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np
     return np.array(places, float)
 
 
-def _most_upright(places: NDArray[np.float64], place: NDArray[np.float64]) -> int:
+def _most_upright(places: Float64Array, place: Float64Array) -> int:
     """Return the index of the place, of those where the rig has its present size, or the nearest to
     it, in which one of the axes is nearest to the vertical: a boat or a horse that carries a rig
     tilts it, and the rig is measured standing.
@@ -496,7 +493,7 @@ def _repeat(rig: bpy.types.Object, action: bpy.types.Action, keys: Sequence[Bone
         repeat_root_object(empty)
 
 
-def _set_parent(rig: bpy.types.Object, frames: NDArray[np.float64], motion: _PlacedMotion) -> None:
+def _set_parent(rig: bpy.types.Object, frames: Float64Array, motion: _PlacedMotion) -> None:
     """Parent the rig to a root object that follows the trajectory, or remove a former root
     object.
     """

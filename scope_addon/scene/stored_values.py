@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import bpy
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from ..arrays import Float64Array
     from ..review_spans import Span
 
 LAST_FRAME = 1_048_574  # of Blender's timeline; the first one is its negative
@@ -94,7 +92,7 @@ class FrameSpan(NamedTuple):
         return f"{self.first}" if self.first == self.last else f"{self.first}-{self.last}"
 
 
-def in_scene(span: Span, frames: NDArray[np.float64]) -> FrameSpan:
+def in_scene(span: Span, frames: Float64Array) -> FrameSpan:
     """Return a span of a motion in scene frames.
 
     :param frames: (T,) scene frame of each pose.

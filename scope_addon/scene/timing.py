@@ -15,12 +15,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Float64Array, FloatArray, IndexArray
 from ..errors import MotionFileError, UsageError
 from .stored_values import LAST_FRAME, RATE, RATES, stored_rate, stored_text
 
@@ -74,8 +73,8 @@ def set_scene_rate(scene: bpy.types.Scene, frames_per_second: float) -> None:
 
 
 def rows_of_scene_frames(
-    frames: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    frames: Float64Array,
+) -> tuple[Float64Array, IndexArray]:
     """Return the whole frames (N,) of the scene during which a motion lasts, and the row of the
     pose that is nearest to each.
 
@@ -86,9 +85,7 @@ def rows_of_scene_frames(
     return scene_frames, rows
 
 
-def key_frames(
-    timestamps: NDArray[np.float64], rate: float, start_frame: float = 0.0
-) -> NDArray[np.float64]:
+def key_frames(timestamps: Float64Array, rate: float, start_frame: float = 0.0) -> Float64Array:
     """Return the scene frame of each pose: ``start_frame + timestamp · rate``, fractions kept.
 
     Keys within a thousandth of a whole frame are snapped to it, because timestamps are rounded.
@@ -109,7 +106,7 @@ def key_frames(
     return np.where(np.abs(frames - whole) < 1e-3, whole, frames)
 
 
-def whole_frames_of(frames: NDArray[np.float64]) -> NDArray[np.float64]:
+def whole_frames_of(frames: Float64Array) -> Float64Array:
     """Return the whole frames (N,) within the span of keys (T,); the nearest if all keys lie
     between two of them.
     """
@@ -236,7 +233,7 @@ class Retiming:
         """Return where a frame is moved to."""
         return self.origin + self.factor * (frame - self.origin)
 
-    def frames(self, frames: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    def frames(self, frames: FloatArray) -> Float64Array:
         """Return where keys (T,) are moved to; those within their precision of a whole frame are
         put on it.
         """

@@ -17,8 +17,8 @@ from uuid import uuid4
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import BoolArray, Float64Array
 from ..capture_report import Report
 from ..errors import UsageError, VideoError
 from ..job.cache import Cache, CachedCapture
@@ -402,7 +402,7 @@ def show_result(
 
 
 def review_spans(
-    motion: Motion, frames: NDArray[np.float64], under_floor: NDArray[np.bool_]
+    motion: Motion, frames: Float64Array, under_floor: BoolArray
 ) -> dict[str, list[FrameSpan]]:
     """Return the review spans of a motion in scene frames, by reason; at most the longest
     ``_MAX_SPANS`` of each.

@@ -19,10 +19,8 @@ from .reporting import ReportingOperator, refuse
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from ...solver.body import Body
+    from ..arrays import Float64Array
     from ..edit.clip import Clip
     from ..motion import Motion
 
@@ -132,7 +130,7 @@ def body_of(armature: bpy.types.Object) -> Body:
     return load_body(which)
 
 
-def betas_of(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
+def betas_of(armature: bpy.types.Object, body: Body) -> Float64Array:
     """Return the person's shape coefficients, (P,).
 
     :raises UsageError: the armature does not store them.
@@ -180,7 +178,7 @@ def edit_clip(
     armature: bpy.types.Object,
     body: Body,
     rate: float,
-    change: Callable[[Clip, NDArray[np.float64]], Clip],
+    change: Callable[[Clip, Float64Array], Clip],
 ) -> None:
     """Replace the keys of a captured armature on the same frames.
 

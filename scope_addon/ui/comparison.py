@@ -33,7 +33,7 @@ from .captures import people_of
 from .sidebar import main_region, viewport_at, viewports
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from ..arrays import Float64Array
 
 _MIN_SIDE = 0.3  # of the viewport's width
 _DRAWN_AFTER_S = 0.2
@@ -379,7 +379,7 @@ def visible_part(
 def side_extent(
     followed: bpy.types.Object,
     people: Sequence[bpy.types.Object],
-    R_world_view: NDArray[np.float64],
+    R_world_view: Float64Array,
 ) -> tuple[float, float]:
     """Return the width and height that a view along -z must show around the pelvis of ``followed``,
     in units of the scene, in which people may be scaled.
@@ -404,7 +404,7 @@ def side_extent(
     return width, 2.0 * (float(far[1]) + size * _HALF_HEIGHT_M)
 
 
-def _pelvis_path(armature: bpy.types.Object, rate: float) -> NDArray[np.float64] | None:
+def _pelvis_path(armature: bpy.types.Object, rate: float) -> Float64Array | None:
     """Return the scene frame and the world position of the pelvis at every key, (T, 4); None
     without keys.
     """

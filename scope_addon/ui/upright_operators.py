@@ -21,10 +21,8 @@ from .reporting import iface_, refuse, rpt_, sentence
 from .sidebar import main_region
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from ...solver.body import Body
+    from ..arrays import Float64Array
     from ..motion import Motion
 
 _HELP = (
@@ -68,7 +66,7 @@ def _set_upright(
     scene: bpy.types.Scene,
     armature: bpy.types.Object,
     motion: Motion,
-    transform: NDArray[np.float64],
+    transform: Float64Array,
 ) -> None:
     """Move everybody of a capture, and the camera, by a transform (4, 4) of the world."""
     from ..edit.corrections import Upright, added

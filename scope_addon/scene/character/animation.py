@@ -15,17 +15,17 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ....solver.rotations import quaternion_from_matrix
+from ...arrays import Float64Array
 from ...kinematics.axes import R_WORLD_MODEL
 from ...motion import Motion
 from ..actions import Channels, bone_path
 from .armature import RestPose, rest_orientations
 
 
-def quaternion_from_rotation_vector(rotation_vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def quaternion_from_rotation_vector(rotation_vectors: Float64Array) -> Float64Array:
     """Convert rotation vectors (..., 3), radians, to unit quaternions (..., 4) in the order w, x,
     y, z.
     """
@@ -34,7 +34,7 @@ def quaternion_from_rotation_vector(rotation_vectors: NDArray[np.float64]) -> ND
     return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * rotation_vectors], axis=-1)
 
 
-def quaternion_product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def quaternion_product(a: Float64Array, b: Float64Array) -> Float64Array:
     """Return ``a ⊗ b`` (..., 4) of quaternions (w, x, y, z), a and b (..., 4): the rotation b
     followed by a.
     """
@@ -47,7 +47,7 @@ def quaternion_product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArra
     return np.stack([w, x, y, z], axis=-1)
 
 
-def on_one_hemisphere(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+def on_one_hemisphere(quaternions: Float64Array) -> Float64Array:
     """Choose the signs of quaternions so that consecutive ones are on one hemisphere; q and −q are
     equal rotations.
 
@@ -65,8 +65,8 @@ def on_one_hemisphere(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def pose_channels(
-    body: Body, motion: Motion, rest: RestPose, M: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    body: Body, motion: Motion, rest: RestPose, M: Float64Array
+) -> tuple[Float64Array, Float64Array]:
     """Compute Blender's channels for every frame of a motion.
 
     :param M: (K+1, 3, 3) rest orientations.
@@ -90,7 +90,7 @@ def animate_armature(
     body: Body,
     motion: Motion,
     rest: RestPose,
-    frames: NDArray[np.float64],
+    frames: Float64Array,
 ) -> Channels:
     """Key every joint's rotation and the root's location at scene ``frames`` (T,), with linear
     interpolation.

@@ -16,13 +16,12 @@ is appended, and `unlink_rings` takes it out again.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ...arrays import Float64Array, FloatArray
 from ...kinematics.axes import R_WORLD_MODEL, UP
 from ..datablocks import enter_object_mode
 
@@ -45,13 +44,13 @@ _WIRE_WIDTH = 2.0  # pixels
 class RestPose:
     """Rest pose of a body of one shape, in the world frame, standing on the floor."""
 
-    joints: NDArray[np.float64]  # (K+1, 3) metres
-    tails: NDArray[np.float64]  # (K+1, 3) metres
+    joints: Float64Array  # (K+1, 3) metres
+    tails: Float64Array  # (K+1, 3) metres
     # (3,) metres, added to R_world_model · model so that the lowest vertex lies at z = 0
-    lift: NDArray[np.float64]
+    lift: Float64Array
 
 
-def rest_pose(body: Body, betas: NDArray[np.floating[Any]]) -> RestPose:
+def rest_pose(body: Body, betas: FloatArray) -> RestPose:
     """Return joints, bone tails and lift of the body at shape ``betas`` (P,)."""
     vertices = body.rest_vertices(betas) @ R_WORLD_MODEL.T
     lift = np.array([0.0, 0.0, -vertices[:, 2].min()])
@@ -59,9 +58,7 @@ def rest_pose(body: Body, betas: NDArray[np.floating[Any]]) -> RestPose:
     return RestPose(joints, _bone_tails(body, joints, vertices + lift), lift)
 
 
-def _bone_tails(
-    body: Body, joints: NDArray[np.float64], vertices: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _bone_tails(body: Body, joints: Float64Array, vertices: Float64Array) -> Float64Array:
     """Return the tails (K+1, 3) for display: at a child joint, or at the end of the surface that
     the bone moves.
     """
@@ -122,14 +119,14 @@ def build_armature(
     return obj
 
 
-def rest_orientations(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
+def rest_orientations(armature: bpy.types.Object, body: Body) -> Float64Array:
     """Return M_i (K+1, 3, 3): bone to armature space at rest, as stored by Blender,
     orthonormalized.
     """
     bones = armature.data.bones
     M = np.array([np.array(bones[name].matrix_local)[:3, :3] for name in body.joint_names], float)
     U, _, Vt = np.linalg.svd(M)
-    M_i: NDArray[np.float64] = U @ Vt
+    M_i: Float64Array = U @ Vt
     return M_i
 
 
@@ -140,7 +137,7 @@ def side_of(joint_name: str) -> str:
 
 
 def show_bones(
-    armature: bpy.types.Object, body: Body, rest: RestPose, vertices: NDArray[np.float64]
+    armature: bpy.types.Object, body: Body, rest: RestPose, vertices: Float64Array
 ) -> None:
     """Give every bone the colour and collection of its side, and a ring around the surface that it
     moves.
@@ -166,8 +163,8 @@ def show_bones(
 
 
 def surface_radii(
-    body: Body, rest: RestPose, M: NDArray[np.float64], vertices: NDArray[np.float64]
-) -> NDArray[np.float64]:
+    body: Body, rest: RestPose, M: Float64Array, vertices: Float64Array
+) -> Float64Array:
     """Measure the distance of the body's surface from each bone's axis, in the middle of the bone.
 
     It is the 90 % quantile over the vertices that the bone moves most, in the middle half of its

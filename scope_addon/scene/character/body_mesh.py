@@ -10,13 +10,12 @@ at J(β) of the fitted shape, so at the fitted values Blender's deformation is e
 from __future__ import annotations
 
 from collections.abc import Container
-from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ...arrays import Float32Array, Float64Array, FloatArray, IndexArray
 from ...errors import MotionFileError
 from ...kinematics.axes import R_WORLD_MODEL
 from ..actions import Channels, shape_key_path
@@ -26,7 +25,7 @@ MODES = ("keyed", "baked")
 
 
 def build_mesh(
-    name: str, body: Body, vertices: NDArray[np.float64], collection: bpy.types.Collection
+    name: str, body: Body, vertices: Float64Array, collection: bpy.types.Collection
 ) -> bpy.types.Object:
     """Create a mesh object of the body with UVs and materials, at the world's origin.
 
@@ -55,7 +54,7 @@ def build_mesh(
 
 
 def colour_faces(
-    mesh: bpy.types.Object, faces: NDArray[np.intp], name: str, color: tuple[float, float, float]
+    mesh: bpy.types.Object, faces: IndexArray, name: str, color: tuple[float, float, float]
 ) -> None:
     """Give some faces (n,) of a mesh a matte material of their own, of a linear RGB colour."""
     material = _material(name, np.array([*color, 1.0]))
@@ -67,15 +66,15 @@ def colour_faces(
 
 
 def rest_vertices_world(
-    body: Body, lift: NDArray[np.float64], betas: NDArray[np.floating[Any]] | None = None
-) -> NDArray[np.float64]:
+    body: Body, lift: Float64Array, betas: FloatArray | None = None
+) -> Float64Array:
     """Return the vertices of the rest mesh in the world frame.
 
     :param lift: (3,) metres, as in ``RestPose``.
     :param betas: (P,) shape coefficients; None for the mean shape.
     :return: (V, 3) metres, z up.
     """
-    vertices: NDArray[np.float64] = body.rest_vertices(betas) @ R_WORLD_MODEL.T + lift
+    vertices: Float64Array = body.rest_vertices(betas) @ R_WORLD_MODEL.T + lift
     return vertices
 
 
@@ -99,7 +98,7 @@ def skin_to_armature(mesh: bpy.types.Object, armature: bpy.types.Object, body: B
     mesh.parent = armature
 
 
-def _materials(body: Body) -> list[tuple[str, NDArray[np.float64]]]:
+def _materials(body: Body) -> list[tuple[str, Float64Array]]:
     plain = np.array([0.6, 0.6, 0.6, 1.0])
     names = body.material_names or ("body",)
     colors = (
@@ -110,7 +109,7 @@ def _materials(body: Body) -> list[tuple[str, NDArray[np.float64]]]:
     return list(zip(names, colors, strict=True))
 
 
-def _material(name: str, color: NDArray[np.float64]) -> bpy.types.Material:
+def _material(name: str, color: Float64Array) -> bpy.types.Material:
     """Create a matte Principled material of a linear RGBA colour (4,), for viewport and render."""
     material = bpy.data.materials.new(name)
     rgba = tuple(float(c) for c in color)
@@ -130,7 +129,7 @@ def shape_key_name(coefficient: int) -> str:
     return f"Shape{coefficient:03d}"
 
 
-def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: NDArray[np.floating[Any]]) -> None:
+def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: FloatArray) -> None:
     """Add ``Basis`` (the current mesh: β = 0) and one key per coefficient, each at its fitted
     value.
 
@@ -158,7 +157,7 @@ def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: NDArray[np.floatin
 def key_shape(
     mesh: bpy.types.Object,
     action: bpy.types.Action,
-    betas: NDArray[np.floating[Any]],
+    betas: FloatArray,
     frame: float,
 ) -> Channels:
     """Key the shape coefficients at a scene frame, and return the channels of the mesh's shape
@@ -173,7 +172,7 @@ def key_shape(
     return channels
 
 
-def mixed_vertices(mesh: bpy.types.Object, without: Container[str] = ()) -> NDArray[np.float32]:
+def mixed_vertices(mesh: bpy.types.Object, without: Container[str] = ()) -> Float32Array:
     """Return the rest vertices (V, 3) at the current slider values: ``basis + Σ_p value_p (key_p −
     basis)``.
 
@@ -188,7 +187,7 @@ def mixed_vertices(mesh: bpy.types.Object, without: Container[str] = ()) -> NDAr
     return mixed.astype(np.float32)
 
 
-def key_vertices(key: bpy.types.ShapeKey) -> NDArray[np.float32]:
+def key_vertices(key: bpy.types.ShapeKey) -> Float32Array:
     """Return where a shape key has the vertices (V, 3)."""
     vertices = np.empty((len(key.data), 3), np.float32)
     key.data.foreach_get("co", vertices.ravel())

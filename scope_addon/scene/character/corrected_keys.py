@@ -15,13 +15,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ...edit.clip import Clip, differ, sample
 from ...edit.corrected_motion import corrections_of, floor_of, pin_in_world, shot_of, uncorrected
 from ...edit.corrections import (
@@ -145,8 +144,8 @@ def _with_raised_keys(
     armature: bpy.types.Object,
     body: Body,
     clip: Clip,
-    frames: NDArray[np.float64],
-    rises: NDArray[np.float64],
+    frames: Float64Array,
+    rises: Float64Array,
 ) -> Clip:
     """Raise keys by vectors (T, 3), metres, and return their clip."""
     raised = Clip(clip.times, clip.rotations, clip.root + rises)
@@ -156,7 +155,7 @@ def _with_raised_keys(
 
 def pinned_places(
     armature: bpy.types.Object, body: Body, rate: float, motion: Motion
-) -> dict[Pin, NDArray[np.float64]]:
+) -> dict[Pin, Float64Array]:
     """Return where the keys have each pinned joint in its frame, (3,) metres in the world of the
     capture.
 
@@ -216,8 +215,8 @@ def heights_of_foot(
 
 
 def captured_points(
-    armature: bpy.types.Object, frame: float, points_world: NDArray[np.float64]
-) -> NDArray[np.float64]:
+    armature: bpy.types.Object, frame: float, points_world: Float64Array
+) -> Float64Array:
     """Convert points of the scene (N, 3) at the current frame to the world of the capture, (N, 3)
     metres.
     """
@@ -275,12 +274,12 @@ def frames_that_show(
     return near[shown[0]], near[shown[-1]]
 
 
-def _nearest_rows(motion: Motion, times: NDArray[np.float64]) -> NDArray[np.intp]:
+def _nearest_rows(motion: Motion, times: Float64Array) -> IndexArray:
     """Return the row of a motion that is nearest to each of the times (N,); of two, the earlier
     one, in spite of rounding.
     """
     distance = np.abs(motion.timestamps[:, None] - times)
-    nearest: NDArray[np.intp] = (distance <= distance.min(axis=0) + _SAME_S).argmax(axis=0)
+    nearest: IndexArray = (distance <= distance.min(axis=0) + _SAME_S).argmax(axis=0)
     return nearest
 
 
@@ -322,8 +321,8 @@ def check_times_of_keys(armature: bpy.types.Object, motion: Motion, rate: float)
 
 
 def _are_moved(
-    frames: NDArray[np.float64],
-    captured: NDArray[np.float64],
+    frames: Float64Array,
+    captured: Float64Array,
     first: float,
     last: float,
     rounded: float,
@@ -346,7 +345,7 @@ def _are_moved(
     return bool((~inside).sum() > max(_ADDED_POSES, _ADDED_SHARE * len(frames)))
 
 
-def _are_later(frames: NDArray[np.float64], first: float, last: float, rounded: float) -> bool:
+def _are_later(frames: Float64Array, first: float, last: float, rounded: float) -> bool:
     """Return whether all keys were shifted to later frames, whatever was added to them: there is
     none at the first frame, but there are some after the last.
 
@@ -384,7 +383,7 @@ def _start(armature: bpy.types.Object, rate: float) -> float:
     return start_frame(armature) / rate
 
 
-def _at(clip: Clip, times: NDArray[np.float64], start: float) -> Clip:
+def _at(clip: Clip, times: Float64Array, start: float) -> Clip:
     """Sample a captured clip at the keys' times; keys at its own frames must not mix in a little of
     the next frame.
     """
@@ -397,7 +396,7 @@ def _at(clip: Clip, times: NDArray[np.float64], start: float) -> Clip:
 
 
 def _check_root_motion(
-    armature: bpy.types.Object, was: NDArray[np.float64] | None, now: NDArray[np.float64] | None
+    armature: bpy.types.Object, was: Float64Array | None, now: Float64Array | None
 ) -> None:
     """Refuse to turn the world of keys whose root motion is on an object.
 
@@ -410,9 +409,7 @@ def _check_root_motion(
         )
 
 
-def _moves(
-    again: NDArray[np.bool_], was: NDArray[np.float64] | None, now: NDArray[np.float64] | None
-) -> NDArray[np.float64]:
+def _moves(again: BoolArray, was: Float64Array | None, now: Float64Array | None) -> Float64Array:
     """Return the transform (T, 4, 4) of each row for an upright line: rows with all corrections
     have the former one.
 
@@ -430,9 +427,9 @@ def _write_change(
     armature: bpy.types.Object,
     body: Body,
     clip: Clip,
-    frames: NDArray[np.float64],
+    frames: Float64Array,
     change: tuple[Clip, Clip],
-    moves: NDArray[np.float64] | None = None,
+    moves: Float64Array | None = None,
 ) -> None:
     """Apply the change between two clips to the keys at which they differ, then move these in the
     world.
@@ -452,7 +449,7 @@ def _write_change(
     write_keys(armature, body, changed, frames, which)
 
 
-def _moved_rows(clip: Clip, moves: NDArray[np.float64]) -> tuple[Clip, NDArray[np.bool_]]:
+def _moved_rows(clip: Clip, moves: Float64Array) -> tuple[Clip, BoolArray]:
     """Move each row in the world by its rigid transform (T, 4, 4); also return which rows (T,) that
     moves.
     """
@@ -470,11 +467,11 @@ class KeyEdits:
     """The corrections of a motion, the last one among them, and the keys that are to be edited."""
 
     corrections: tuple[Correction, ...]
-    betas: NDArray[np.floating[Any]]  # (P,) shape coefficients
+    betas: FloatArray  # (P,) shape coefficients
     shot: Shot  # on the clock of the keys
     new: Correction | None  # which is applied to all keys
     # (T,) keys that begin without corrections, to which all edits are applied
-    rows: NDArray[np.bool_]
+    rows: BoolArray
 
     def any(self) -> bool:
         """Return whether there is an edit among the corrections."""
@@ -485,7 +482,7 @@ def begin_with_edits(
     armature: bpy.types.Object,
     body: Body,
     clips: tuple[Clip, Clip],
-    frames: NDArray[np.float64],
+    frames: Float64Array,
     edits: KeyEdits,
 ) -> tuple[Clip, Clip]:
     """Edit keys, and the clip that they are compared with.
@@ -542,9 +539,9 @@ def meet_floor(
 def floored(
     armature: bpy.types.Object,
     body: Body,
-    betas: NDArray[np.floating[Any]],
+    betas: FloatArray,
     clip: Clip,
-    frames: NDArray[np.float64],
+    frames: Float64Array,
     feet: FeetOnFloor,
     height: float = 0.0,
     shot: Shot | None = None,
@@ -562,7 +559,7 @@ def floored(
     return relative_to_trajectory(placed, *path)
 
 
-def _replaced(clip: Clip, rows: NDArray[np.bool_], part: Clip) -> Clip:
+def _replaced(clip: Clip, rows: BoolArray, part: Clip) -> Clip:
     """Return a clip with other values in some rows."""
     out = clip.copy()
     out.rotations[rows] = part.rotations

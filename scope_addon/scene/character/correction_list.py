@@ -12,9 +12,7 @@ import bpy
 from ..stored_values import LAST_FRAME
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from ...arrays import Float64Array
     from ...edit.corrections import Correction, Pin
     from ...motion import Motion
 
@@ -57,7 +55,7 @@ def store_corrections(
     armature: bpy.types.Object,
     motion: Motion,
     rate: float,
-    places: dict[Pin, NDArray[np.float64]] | None = None,
+    places: dict[Pin, Float64Array] | None = None,
 ) -> None:
     """Store the list of a motion's corrections with its armature.
 
@@ -138,7 +136,7 @@ def _title(name: str) -> str:
     return name.replace("_", " ").title()
 
 
-def _missed(motion: Motion, pin: Pin, place: NDArray[np.float64] | None) -> str:
+def _missed(motion: Motion, pin: Pin, place: Float64Array | None) -> str:
     """Return how far a joint is from a pin that it cannot reach, with the unit; empty if it is
     there.
     """

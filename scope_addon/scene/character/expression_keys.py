@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ...arrays import Float32Array, Float64Array
 from ...kinematics.axes import R_WORLD_MODEL
 from ...kinematics.face import EXPRESSIONS, expressions_of, mouth_faces_of
 from ...motion import Motion
@@ -50,7 +50,7 @@ def key_expressions(
     mesh: bpy.types.Object,
     channels: Channels,
     motion: Motion,
-    frames: NDArray[np.float64],
+    frames: Float64Array,
     whole_frames: bool = False,
 ) -> None:
     """Key the weights of the motion's face; an expression that never changes gets one key, one that
@@ -74,7 +74,7 @@ def key_expressions(
             channels.write(path, at[:1], values[:1], "CONSTANT", group="Face")
 
 
-def expression_offsets(mesh: bpy.types.Object) -> dict[str, NDArray[np.float32]]:
+def expression_offsets(mesh: bpy.types.Object) -> dict[str, Float32Array]:
     """Return how far each expression's key moves the vertices (V, 3), by name; none if there are no
     such keys.
     """
@@ -84,7 +84,7 @@ def expression_offsets(mesh: bpy.types.Object) -> dict[str, NDArray[np.float32]]
 
 
 def copy_expressions(
-    mesh: bpy.types.Object, source: bpy.types.Key, offsets: dict[str, NDArray[np.float32]]
+    mesh: bpy.types.Object, source: bpy.types.Key, offsets: dict[str, Float32Array]
 ) -> None:
     """Give a mesh without shape keys those of another one's expressions, with their keyframes.
 
@@ -103,7 +103,7 @@ def copy_expressions(
                 channels.write(curve.data_path, keys[:, 0], keys[:, 1])
 
 
-def _add_key(mesh: bpy.types.Object, name: str, places: NDArray[np.float32], value: float) -> None:
+def _add_key(mesh: bpy.types.Object, name: str, places: Float32Array, value: float) -> None:
     """Add a shape key that has the vertices at ``places`` (V, 3)."""
     key = mesh.shape_key_add(name=name, from_mix=False)
     key.data.foreach_set("co", places.ravel())

@@ -14,14 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ....solver.rotations import matrix_from_quaternion, quaternion_from_matrix
+from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ...edit.clip import Clip, band_limited, sample
 from ...errors import UsageError
 from ...kinematics.axes import R_WORLD_MODEL
@@ -43,9 +42,7 @@ ROTATION = "rotation_quaternion"
 LOCATION = "location"
 
 
-def read_clip(
-    armature: bpy.types.Object, body: Body, rate: float
-) -> tuple[Clip, NDArray[np.float64]]:
+def read_clip(armature: bpy.types.Object, body: Body, rate: float) -> tuple[Clip, Float64Array]:
     """Read the motion from the keys.
 
     If curves have keys at different frames, every frame with a key on any curve is included.
@@ -61,9 +58,7 @@ def read_clip(
     return read_clip_at(armature, body, rate, frames), frames
 
 
-def read_clip_at(
-    armature: bpy.types.Object, body: Body, rate: float, frames: NDArray[np.float64]
-) -> Clip:
+def read_clip_at(armature: bpy.types.Object, body: Body, rate: float, frames: Float64Array) -> Clip:
     """Read the motion at scene frames (T,), as interpolated by Blender.
 
     :param rate: scene frames per second.
@@ -85,7 +80,7 @@ def read_clip_at(
 
 def channel_values(
     armature: bpy.types.Object, body: Body, clip: Clip
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Float64Array, Float64Array]:
     """Compute Blender's channels of a clip.
 
     :return: quaternions (T, K+1, 4) on one hemisphere; root locations (T, 3) in the armature's
@@ -98,9 +93,7 @@ def channel_values(
     return on_one_hemisphere(quaternion_from_matrix(B)), clip.root - _root_head(armature, body)
 
 
-def write_clip(
-    armature: bpy.types.Object, body: Body, clip: Clip, frames: NDArray[np.float64]
-) -> None:
+def write_clip(armature: bpy.types.Object, body: Body, clip: Clip, frames: Float64Array) -> None:
     """Replace the keys of all bones by the clip's, at scene frames (T,); curves, groups and action
     are kept.
 
@@ -117,8 +110,8 @@ def write_keys(
     armature: bpy.types.Object,
     body: Body,
     clip: Clip,
-    frames: NDArray[np.float64],
-    which: NDArray[np.bool_],
+    frames: Float64Array,
+    which: BoolArray,
 ) -> None:
     """Replace only some keys by the clip's; a curve that has no key at one of these frames gets
     one.
@@ -168,7 +161,7 @@ class Reduction:
 def reduce_keys(
     armature: bpy.types.Object,
     body: Body,
-    betas: NDArray[np.floating[Any]],
+    betas: FloatArray,
     rate: float,
     angle: float,
     distance: float,
@@ -214,15 +207,13 @@ def location_path(body: Body) -> str:
     return bone_path(body.joint_names[0], LOCATION)
 
 
-def _values_by_path(
-    body: Body, q: NDArray[np.float64], location: NDArray[np.float64]
-) -> dict[str, NDArray[np.float64]]:
+def _values_by_path(body: Body, q: Float64Array, location: Float64Array) -> dict[str, Float64Array]:
     """Return the values of ``channel_values`` by data path, (T, 4) or (T, 3)."""
     rotations = {bone_path(name, ROTATION): q[:, k] for k, name in enumerate(body.joint_names)}
     return rotations | {location_path(body): location}
 
 
-def _root_head(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
+def _root_head(armature: bpy.types.Object, body: Body) -> Float64Array:
     """Return h_0 (3,)."""
     return np.array(armature.data.bones[body.joint_names[0]].head_local)
 
@@ -248,7 +239,7 @@ def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.
     return {path: [by_index[i] for i in sorted(by_index)] for path, by_index in found.items()}
 
 
-def _values(curve: bpy.types.FCurve, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+def _values(curve: bpy.types.FCurve, frames: Float64Array) -> Float64Array:
     """Evaluate the curve's keys at frames (T,); if these are theirs, read them, which is much
     faster.
     """
@@ -281,18 +272,18 @@ def _check_bones(armature: bpy.types.Object, body: Body) -> None:
             )
 
 
-def _axes(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
+def _axes(armature: bpy.types.Object, body: Body) -> Float64Array:
     """Return C_i = M_iᵀ R_world_model (K+1, 3, 3)."""
-    axes: NDArray[np.float64] = np.swapaxes(rest_orientations(armature, body), 1, 2) @ R_WORLD_MODEL
+    axes: Float64Array = np.swapaxes(rest_orientations(armature, body), 1, 2) @ R_WORLD_MODEL
     return axes
 
 
 def _kept_keys(
-    times: NDArray[np.float64],
-    values: NDArray[np.float64],
-    errors: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
+    times: Float64Array,
+    values: Float64Array,
+    errors: Callable[[Float64Array, Float64Array], Float64Array],
     bound: float,
-) -> NDArray[np.intp]:
+) -> IndexArray:
     """Return the indices of keys between which all others are interpolated within an error bound.
 
     A span is split at its worst key while the error exceeds the bound (Ramer, Douglas and Peucker).
@@ -319,13 +310,13 @@ def _kept_keys(
     return np.flatnonzero(keep)
 
 
-def _distances(p: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
+def _distances(p: Float64Array, wanted: Float64Array) -> Float64Array:
     """Return the distances (N,) between positions (N, 3)."""
-    distances: NDArray[np.float64] = np.linalg.norm(p - wanted, axis=1)
+    distances: Float64Array = np.linalg.norm(p - wanted, axis=1)
     return distances
 
 
-def angles_between(q: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
+def angles_between(q: Float64Array, wanted: Float64Array) -> Float64Array:
     """Return the angles between rotations, by the sine of a quarter of each: accurate for small
     angles.
 
@@ -335,5 +326,5 @@ def angles_between(q: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArr
     """
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     chord = np.minimum(np.linalg.norm(q - wanted, axis=-1), np.linalg.norm(q + wanted, axis=-1))
-    angles: NDArray[np.float64] = 4.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))
+    angles: Float64Array = 4.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))
     return angles

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ...arrays import BoolArray, Float64Array
 from ...edit.corrected_motion import corrections_of
 from ...edit.corrections import Exchange
 from ...edit.spans import joints_of_limbs
@@ -84,7 +84,7 @@ def cut_to_cycle(armature: bpy.types.Object, body: Body, first: float, last: flo
 
 
 def restore_whole_motion(
-    armature: bpy.types.Object, body: Body, motion: Motion, frames: NDArray[np.float64]
+    armature: bpy.types.Object, body: Body, motion: Motion, frames: Float64Array
 ) -> None:
     """Give the curves the keys of the whole captured motion again, at scene frames (T,).
 
@@ -125,7 +125,7 @@ def key_measurements(
     channels: Channels,
     body: Body,
     motion: Motion,
-    frames: NDArray[np.float64],
+    frames: Float64Array,
 ) -> None:
     """Key confidence, standard deviation and contact as custom properties of the bones, at scene
     frames (T,).
@@ -149,7 +149,7 @@ def key_measurements(
             curve.hide = True
 
 
-def measurements_of(body: Body, motion: Motion) -> dict[tuple[str, str], NDArray[np.float64]]:
+def measurements_of(body: Body, motion: Motion) -> dict[tuple[str, str], Float64Array]:
     """Return the values (T,) by bone and property, with the sides exchanged as the corrections say;
     NaN where one is not known.
     """
@@ -183,7 +183,7 @@ def exchange_measurements(
     body: Body,
     before: Motion,
     after: Motion,
-    frames: NDArray[np.float64],
+    frames: Float64Array,
 ) -> None:
     """Change the keys of measurements where another correction exchanges left and right, so that
     the foot that rests in the user's eyes has the contact.
@@ -210,9 +210,7 @@ def exchange_measurements(
         change_keys(curve, at[old != new], new[old != new])
 
 
-def _known_values_at(
-    at: NDArray[np.float64], frames: NDArray[np.float64], values: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _known_values_at(at: Float64Array, frames: Float64Array, values: Float64Array) -> Float64Array:
     """Return values (T,) at frames (T,) between those that are known, at frames (n,)."""
     known = np.isfinite(values)
     return np.interp(at, frames[known], values[known])
@@ -222,8 +220,8 @@ def add_review_markers(
     scene: bpy.types.Scene,
     prefix: str,
     motion: Motion,
-    frames: NDArray[np.float64],
-    under_floor: NDArray[np.bool_] | None = None,
+    frames: Float64Array,
+    under_floor: BoolArray | None = None,
 ) -> list[str]:
     """Add a timeline marker at the start of each review span; return the names of the new ones.
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 from mathutils import Matrix
-from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ...arrays import Float64Array
 from ...edit.clip import Clip
 from ...edit.edits import moved_clip
 from ...edit.root_motion import floor_trajectory, relative_to_trajectory, with_trajectory
@@ -62,9 +62,9 @@ def root_object(armature: bpy.types.Object) -> bpy.types.Object | None:
 
 def parent_to_root_object(
     armature: bpy.types.Object,
-    frames: NDArray[np.float64],
-    positions: NDArray[np.float64],
-    angles: NDArray[np.float64],
+    frames: Float64Array,
+    positions: Float64Array,
+    angles: Float64Array,
     *,
     in_place: bool = False,
     below_parent: bool = False,
@@ -262,9 +262,7 @@ def move_root_motion_to_bones(armature: bpy.types.Object, body: Body, rate: floa
     remove_root_object(armature)
 
 
-def clip_with_root_motion(
-    armature: bpy.types.Object, clip: Clip, frames: NDArray[np.float64]
-) -> Clip:
+def clip_with_root_motion(armature: bpy.types.Object, clip: Clip, frames: Float64Array) -> Clip:
     """Return the clip including the trajectory stored in its root object, in use or not, in the
     armature's own space.
 
@@ -279,8 +277,8 @@ def clip_with_root_motion(
 
 
 def removed_root_motion(
-    armature: bpy.types.Object, frames: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    armature: bpy.types.Object, frames: Float64Array
+) -> tuple[Float64Array, Float64Array]:
     """Return the trajectory stored in the root object, in use or not; zeros without a root object.
 
     :param frames: (T,) scene frames.
@@ -311,7 +309,7 @@ def retime_unused_trajectory(empty: bpy.types.Object, retiming: Retiming) -> Non
         empty[_UNUSED_TRAJECTORY] = rows.ravel().tolist()
 
 
-def _unused_trajectory(empty: bpy.types.Object) -> NDArray[np.float64] | None:
+def _unused_trajectory(empty: bpy.types.Object) -> Float64Array | None:
     """Return frame, x, y and angle of a trajectory that is stored but not in use, (T, 4); None if
     there is none.
     """
@@ -320,7 +318,7 @@ def _unused_trajectory(empty: bpy.types.Object) -> NDArray[np.float64] | None:
     return rows if 4 * len(rows) == len(numbers) > 0 and (np.diff(rows[:, 0]) > 0).all() else None
 
 
-def clip_as_displayed(armature: bpy.types.Object, clip: Clip, frames: NDArray[np.float64]) -> Clip:
+def clip_as_displayed(armature: bpy.types.Object, clip: Clip, frames: Float64Array) -> Clip:
     """Return the clip as displayed: moved by its root object, whether animated or at rest.
 
     :param frames: (T,) scene frames of the clip's keys.
@@ -331,8 +329,8 @@ def clip_as_displayed(armature: bpy.types.Object, clip: Clip, frames: NDArray[np
 
 
 def _keyed_path(
-    armature: bpy.types.Object, empty: bpy.types.Object, frames: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    armature: bpy.types.Object, empty: bpy.types.Object, frames: Float64Array
+) -> tuple[Float64Array, Float64Array]:
     """Return the empty's positions (T, 3), in the armature's units, and angles (T,), radians, at
     scene frames (T,).
 

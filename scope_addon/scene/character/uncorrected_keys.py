@@ -15,9 +15,9 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ...arrays import BoolArray, Float32Array, Float64Array
 from ...edit.clip import Clip, differ
 from ...errors import MotionFileError
 from ...untrusted.files import read_npz
@@ -35,9 +35,9 @@ class UncorrectedKeys:
     """R rows of C curves."""
 
     # (R,) seconds since timestamp 0, so that they are valid at any frame rate
-    times: NDArray[np.float64]
-    before: NDArray[np.float32]  # (R, C)
-    written: NDArray[np.float32]  # (R, C)
+    times: Float64Array
+    before: Float32Array  # (R, C)
+    written: Float32Array  # (R, C)
     # Metres by which all keys were raised together with the floor, those of other rows too.
     rise: float = 0.0
 
@@ -70,9 +70,7 @@ class UncorrectedKeys:
         return UncorrectedKeys(times, before.astype(np.float32), written.astype(np.float32), rise)
 
 
-def keyed_values(
-    armature: bpy.types.Object, body: Body, frames: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def keyed_values(armature: bpy.types.Object, body: Body, frames: Float32Array) -> Float32Array:
     """Return the keys' values (T, C) at scene frames (T,); NaN where a curve has no key."""
     curves = channel_curves(armature, body)
     out = np.full((len(frames), len(curves)), np.nan, np.float32)
@@ -120,7 +118,7 @@ def write_both(
     body: Body,
     free: Clip,
     corrected: Clip,
-    frames: NDArray[np.float64],
+    frames: Float64Array,
     rate: float,
 ) -> UncorrectedKeys:
     """Replace all keys by those of a corrected clip, at scene frames (T,).
@@ -139,10 +137,10 @@ def write_both(
 
 
 def changed_rows(
-    frames: NDArray[np.float32],
-    rows: NDArray[np.bool_],
-    before: NDArray[np.float32],
-    after: NDArray[np.float32],
+    frames: Float32Array,
+    rows: BoolArray,
+    before: Float32Array,
+    after: Float32Array,
     start: float,
     rate: float,
 ) -> UncorrectedKeys:

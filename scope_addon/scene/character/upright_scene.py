@@ -8,8 +8,8 @@ import json
 import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion
-from numpy.typing import NDArray
 
+from ...arrays import Float64Array
 from ..actions import fcurves, read_keys, rewrite_keys
 from ..visibility import world_matrix
 from .animation import on_one_hemisphere
@@ -23,7 +23,7 @@ _LARGEST = 1e9  # of its numbers
 def turn_camera(
     camera: bpy.types.Object,
     armature: bpy.types.Object,
-    transform: NDArray[np.float64],
+    transform: Float64Array,
     *,
     to_captured: bool,
 ) -> None:
@@ -94,7 +94,7 @@ def _curves(camera: bpy.types.Object) -> list[bpy.types.FCurve]:
 
 
 def move_camera(
-    camera: bpy.types.Object, armature: bpy.types.Object, transform: NDArray[np.float64]
+    camera: bpy.types.Object, armature: bpy.types.Object, transform: Float64Array
 ) -> None:
     """Move the capture's camera, with its keys, together with a person.
 

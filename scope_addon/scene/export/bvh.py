@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import BoolArray, Float64Array
 from ...kinematics.axes import R_WORLD_MODEL
 
 # the format states no unit; most tools expect centimetres
@@ -35,11 +35,11 @@ class SampledPose:
 
     names: list[str]
     parents: list[int]  # −1 for roots, parents before children
-    heads: NDArray[np.float64]  # (N, 3) at rest
-    tails: NDArray[np.float64]  # (N, 3) at rest
+    heads: Float64Array  # (N, 3) at rest
+    tails: Float64Array  # (N, 3) at rest
     # (T, N, 3, 3) from the rest pose to the pose, both in the world frame
-    rotations: NDArray[np.float64]
-    joints: NDArray[np.float64]  # (T, N, 3)
+    rotations: Float64Array
+    joints: Float64Array  # (T, N, 3)
     rate: float  # frames per second
 
 
@@ -97,7 +97,7 @@ def _subtree(children: list[list[int]], i: int) -> list[int]:
 def _joint_lines(
     children: list[list[int]],
     pose: SampledPose,
-    has_position: NDArray[np.bool_],
+    has_position: BoolArray,
     i: int,
     depth: int,
 ) -> list[str]:
@@ -117,21 +117,21 @@ def _joint_lines(
     return [*lines, f"{pad}}}"]
 
 
-def _triple(v: NDArray[np.float64]) -> str:
+def _triple(v: Float64Array) -> str:
     return f"{v[0]:.6f} {v[1]:.6f} {v[2]:.6f}"
 
 
-def _offsets(pose: SampledPose) -> NDArray[np.float64]:
+def _offsets(pose: SampledPose) -> Float64Array:
     """Return where each joint is at rest (N, 3), relative to its parent, in the file's axes; zero
     for roots.
     """
     parents = np.array(pose.parents)
-    offsets: NDArray[np.float64] = (pose.heads - pose.heads[parents]) @ R_FILE_WORLD.T
+    offsets: Float64Array = (pose.heads - pose.heads[parents]) @ R_FILE_WORLD.T
     offsets[parents < 0] = 0.0
     return offsets
 
 
-def _at_parents(pose: SampledPose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _at_parents(pose: SampledPose) -> tuple[Float64Array, Float64Array]:
     """Return where each joint is in its parent's axes (T, N, 3), and its angles z, y and x relative
     to them (T, N, 3), degrees; of roots, in the file's axes.
     """
@@ -148,7 +148,7 @@ def _at_parents(pose: SampledPose) -> tuple[NDArray[np.float64], NDArray[np.floa
     return places, euler_zyx_degrees(local)
 
 
-def euler_zyx_degrees(R: NDArray[np.float64]) -> NDArray[np.float64]:
+def euler_zyx_degrees(R: Float64Array) -> Float64Array:
     """Decompose ``R = Rz Ry Rx``, continuously in time where possible.
 
     Of the equivalent angles, those nearest to the previous frame are chosen; at gimbal lock
@@ -167,7 +167,7 @@ def euler_zyx_degrees(R: NDArray[np.float64]) -> NDArray[np.float64]:
     # the other decomposition of the same rotation
     other = direct * [1, -1, 1] + [180.0, 180.0, 180.0]
     both = np.stack([direct, other], axis=2)
-    out: NDArray[np.float64] = direct.copy()
+    out: Float64Array = direct.copy()
     for t in range(1, len(out)):
         before = out[t - 1][:, None]
         # At gimbal lock, only z - x is known, or where y is negative, z + x.

@@ -13,7 +13,8 @@ import struct
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ...arrays import Float64Array
 
 _BLOCK = 512  # bytes
 _POINTS = 32  # in a block
@@ -33,8 +34,8 @@ Parameter = tuple[int, Sequence[int], bytes]  # kind of its values, their dimens
 def c3d_bytes(
     labels: Sequence[str],
     descriptions: Sequence[str],
-    points_mm: NDArray[np.float64],
-    residuals_mm: NDArray[np.float64],
+    points_mm: Float64Array,
+    residuals_mm: Float64Array,
     rate: float,
     first: int,
 ) -> bytes:

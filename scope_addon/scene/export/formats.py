@@ -39,8 +39,8 @@ import addon_utils
 import bpy
 import numpy as np
 from mathutils import Matrix
-from numpy.typing import NDArray
 
+from ...arrays import Float64Array
 from ...errors import OutputError
 from .. import timing
 from ..capture_parts import cameras_in
@@ -244,10 +244,10 @@ def _place_at_rest(rig: bpy.types.Object) -> Matrix:
     return parent_transform(empty) @ empty.matrix_world.inverted_safe() @ rig.matrix_world
 
 
-def _unscaled(R: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unscaled(R: Float64Array) -> Float64Array:
     """Return the nearest rotations (..., 3, 3) to matrices that may scale and shear."""
     U, _, Vt = np.linalg.svd(R)
-    rotations: NDArray[np.float64] = U @ Vt
+    rotations: Float64Array = U @ Vt
     return rotations
 
 

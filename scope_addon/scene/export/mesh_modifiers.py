@@ -18,6 +18,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Float32Array
 from ...notices import Notice, notice
 from .. import actions
 from ..datablocks import changed
@@ -123,7 +124,7 @@ def _modified_mesh(
     mesh = bpy.data.meshes.new_from_object(
         copy.evaluated_get(graph), preserve_all_data_layers=True, depsgraph=graph
     )
-    places: dict[str, NDArray[np.float32]] = {}
+    places: dict[str, Float32Array] = {}
     try:
         corners = _corners(mesh)
         for block in blocks[1:]:
@@ -156,9 +157,7 @@ def _keys_at_zero(mesh: bpy.types.Mesh) -> list[bpy.types.ShapeKey]:
     return list(mesh.shape_keys.key_blocks)
 
 
-def _add_keys(
-    mesh: bpy.types.Mesh, source: bpy.types.Key, places: dict[str, NDArray[np.float32]]
-) -> None:
+def _add_keys(mesh: bpy.types.Mesh, source: bpy.types.Key, places: dict[str, Float32Array]) -> None:
     """Give a mesh a basis, and shape keys with the names, ranges and values of another one's.
 
     :param places: (V, 3) of each key but the basis, by its name.
@@ -176,7 +175,7 @@ def _add_keys(
     bpy.data.objects.remove(obj)
 
 
-def _vertices(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+def _vertices(mesh: bpy.types.Mesh) -> Float32Array:
     """Return the vertices (V, 3) of a mesh."""
     vertices = np.empty((len(mesh.vertices), 3), np.float32)
     mesh.attributes["position"].data.foreach_get("vector", vertices.ravel())

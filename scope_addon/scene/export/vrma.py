@@ -14,8 +14,8 @@ import struct
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Float64Array
 from ...kinematics.axes import R_WORLD_MODEL
 from ...motion import Motion
 from .bone_names import bone_names
@@ -103,7 +103,7 @@ class _Buffers:
         self.views: list[dict[str, int]] = []
         self.accessors: list[dict[str, Any]] = []
 
-    def add(self, values: NDArray[np.float64], kind: str, *, bounds: bool = False) -> int:
+    def add(self, values: Float64Array, kind: str, *, bounds: bool = False) -> int:
         """Add an array (T,) or (T, n), and return the number of its accessor."""
         data = np.asarray(values, "<f4")
         self.views.append({"buffer": 0, "byteOffset": len(self.content), "byteLength": data.nbytes})

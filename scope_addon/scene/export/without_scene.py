@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import BoolArray, Float64Array
 from ...atomic_write import write_result
 from ...footage import display_text
 from ...kinematics.axes import R_OPENSIM_MODEL, R_OPENSIM_WORLD
@@ -89,8 +89,8 @@ def write_without_scene(
 
 
 def at_one_rate(
-    motion: Motion, columns: Sequence[NDArray[np.float64]]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    motion: Motion, columns: Sequence[Float64Array]
+) -> tuple[Float64Array, Float64Array]:
     """Return times (S,) at the motion's rate, seconds, and the columns' values there, (S, N).
 
     Values of a motion with a variable rate are interpolated linearly.
@@ -105,7 +105,7 @@ def at_one_rate(
     return times_s, rows
 
 
-def _is_seen(motion: Motion, times_s: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _is_seen(motion: Motion, times_s: Float64Array) -> BoolArray:
     """Return (S,) whether the person was seen at times, not between a frame with the person and one
     without, nor where frames are missing.
     """
@@ -113,7 +113,7 @@ def _is_seen(motion: Motion, times_s: NDArray[np.float64]) -> NDArray[np.bool_]:
     return (seen > 1.0 - 1e-6) & ~_in_gap(motion, times_s)
 
 
-def _in_gap(motion: Motion, times_s: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _in_gap(motion: Motion, times_s: Float64Array) -> BoolArray:
     """Return (S,) whether frames are missing at times: those around are far apart."""
     own_s = motion.timestamps
     if len(own_s) < 2:
@@ -123,7 +123,7 @@ def _in_gap(motion: Motion, times_s: NDArray[np.float64]) -> NDArray[np.bool_]:
     before_s = times_s - own_s[after - 1]
     after_s = own_s[after] - times_s
     between = np.minimum(before_s, after_s) > _ON_FRAME * usual_s
-    is_long: NDArray[np.bool_] = before_s + after_s > max(_GAP_S, 1.5 * usual_s)
+    is_long: BoolArray = before_s + after_s > max(_GAP_S, 1.5 * usual_s)
     return is_long & between
 
 
@@ -175,7 +175,7 @@ def write_c3d(path: Path, motion: Motion, body: Body, start_s: float) -> None:
     write_result(path, c3d_bytes(names, parts, points_mm, residuals_mm, rate, first))
 
 
-def world_markers(motion: Motion, body: Body) -> tuple[list[str], NDArray[np.float64], list[int]]:
+def world_markers(motion: Motion, body: Body) -> tuple[list[str], Float64Array, list[int]]:
     """Return the names of the M markers, where they are (T, M, 3), world, metres, and the joint
     that moves each.
     """
@@ -200,9 +200,7 @@ def world_markers(motion: Motion, body: Body) -> tuple[list[str], NDArray[np.flo
     neck = joints[:, [body.joint_names.index("neck")]]
     names = ["Hip", "Neck", *of_joints, *of_keypoints]
     moving = [hips[0], body.joint_names.index("neck"), *at, *body.keypoint_part[which].tolist()]
-    markers: NDArray[np.float64] = np.concatenate(
-        [between, neck, joints[:, at], on_surface], axis=1
-    )
+    markers: Float64Array = np.concatenate([between, neck, joints[:, at], on_surface], axis=1)
     return names, markers, moving
 
 
@@ -236,7 +234,7 @@ def write_angles(path: Path, motion: Motion, body: Body) -> None:
     write_result(path, "\n".join(lines) + "\n")
 
 
-def joint_angles(motion: Motion, body: Body) -> dict[str, NDArray[np.float64]]:
+def joint_angles(motion: Motion, body: Body) -> dict[str, Float64Array]:
     """Return the angles (T,) of each joint, degrees without jumps, and the place of the pelvis,
     metres, by OpenSim's names.
     """
@@ -258,9 +256,7 @@ def joint_angles(motion: Motion, body: Body) -> dict[str, NDArray[np.float64]]:
     return found
 
 
-def _leg_angles(
-    segments: dict[str, NDArray[np.float64]], short: str
-) -> dict[str, NDArray[np.float64]]:
+def _leg_angles(segments: dict[str, Float64Array], short: str) -> dict[str, Float64Array]:
     """Return the angles of a leg; adduction, inversion and inward rotation are positive."""
     side = _SIDE_OF[short]
     inwards = 1.0 if short == "r" else -1.0
@@ -280,9 +276,7 @@ def _leg_angles(
     }
 
 
-def _arm_angles(
-    segments: dict[str, NDArray[np.float64]], short: str
-) -> dict[str, NDArray[np.float64]]:
+def _arm_angles(segments: dict[str, Float64Array], short: str) -> dict[str, Float64Array]:
     """Return the angles of an arm; adduction, inward rotation, pronation, flexion of the wrist and
     its deviation to the little finger are positive.
     """
@@ -308,15 +302,15 @@ def _arm_angles(
 
 
 def _between(
-    R_first: NDArray[np.float64], R_second: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    R_first: Float64Array, R_second: Float64Array
+) -> tuple[Float64Array, Float64Array, Float64Array]:
     """Return the angles of the joint between two segments, see `_angles`."""
     return _angles(np.swapaxes(R_first, -1, -2) @ R_second)
 
 
 def _angles(
-    R: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    R: Float64Array,
+) -> tuple[Float64Array, Float64Array, Float64Array]:
     """Return a, b and c of R = R_z(a) R_x(b) R_y(c), (T, 3, 3), in degrees without jumps.
 
     With the axes x and y exchanged, which is a reflection, it is R_z(−a) R_y(−b) R_x(−c).
