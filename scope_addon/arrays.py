@@ -35,5 +35,4 @@ def round_number(value: float, step: float) -> float:
 
 def round_array(values: FloatArray) -> FloatArray:
     """Return the multiples of `STEP` that are nearest to values."""
-    rounded: FloatArray = np.round(values / STEP) * STEP
-    return rounded
+    return np.round(values / STEP) * STEP

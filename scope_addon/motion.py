@@ -123,8 +123,7 @@ class Motion:
     @property
     def has_residual(self) -> BoolArray:
         """(T,) whether this camera saw the person, so that ``residual_px`` is no mere 0."""
-        known: BoolArray = self.valid & (self.residual_px > 0.0)
-        return known
+        return self.valid & (self.residual_px > 0.0)
 
     @property
     def mean_residual_px(self) -> float:
@@ -336,10 +335,8 @@ class Motion:
         if self.joint_count != body.K + 1 or self.betas.size != body.P:
             raise MotionFileError(
                 f"{where} has {self.joint_count} joints and {self.betas.size} shape coefficients "
-                "(body "
-                f"'{self.body_model}'), but body '{body.name}' has {body.K + 1} and {body.P}; "
-                "choose the body it was "
-                "captured with"
+                f"(body '{self.body_model}'), but body '{body.name}' has {body.K + 1} and "
+                f"{body.P}; choose the body it was captured with"
             )
         if len(self) == 0:
             raise MotionFileError(

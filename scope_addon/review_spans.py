@@ -242,8 +242,7 @@ def _distance(point: Float64Array, a: Float64Array, b: Float64Array) -> Float64A
     along = b - a
     share = ((point - a) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12)
     nearest = a + np.clip(share, 0, 1)[:, None] * along
-    distance: Float64Array = np.linalg.norm(point - nearest, axis=1)
-    return distance
+    return np.linalg.norm(point - nearest, axis=1)
 
 
 def _held(motion: Motion, mask: BoolArray, least_s: float) -> BoolArray:

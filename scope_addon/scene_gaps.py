@@ -19,8 +19,7 @@ def cut_times(times: Float64Array, scene_starts: NDArray[np.int64]) -> Float64Ar
     :param times: (T,) seconds.
     :param scene_starts: (M,) rows, from 1 on, of the frames that begin another scene.
     """
-    middle: Float64Array = 0.5 * (times[scene_starts - 1] + times[scene_starts])
-    return middle
+    return 0.5 * (times[scene_starts - 1] + times[scene_starts])
 
 
 def with_scene_gaps(
@@ -30,8 +29,7 @@ def with_scene_gaps(
 
     :param cuts_s: (M,) seconds, in order, from `cut_times`.
     """
-    later: Float64Array = times + gap_s * np.searchsorted(cuts_s, times)
-    return later
+    return times + gap_s * np.searchsorted(cuts_s, times)
 
 
 def steps_in_scenes(times: Float64Array) -> Float64Array:

@@ -72,8 +72,7 @@ class Footage:
     @property
     def cuts_s(self) -> list[float]:
         """Times of the frames that begin another scene."""
-        times_s: list[float] = self.timestamps[self.scene_starts].tolist()
-        return times_s
+        return self.timestamps[self.scene_starts].tolist()
 
 
 def given_camera(video: Video, options: CaptureOptions) -> Camera:
@@ -349,6 +348,5 @@ def _no_person_error(video: Video, options: CaptureOptions, frames: int) -> NoPe
     )
     return NoPersonError(
         f"no person was found {where}: at least one person must be mostly in the image and at "
-        "least "
-        f"a tenth as tall as its shorter side; crop footage of smaller people{networks}"
+        f"least a tenth as tall as its shorter side; crop footage of smaller people{networks}"
     )

@@ -170,8 +170,7 @@ def blended(image_rgb: Uint8Array, canvas: Canvas) -> Uint8Array:
 
 def tint(person: int) -> Float64Array:
     """Return the (3,) sRGB colour of the person with this index."""
-    color: Float64Array = _TINTS[person % len(_TINTS)]
-    return color
+    return _TINTS[person % len(_TINTS)]
 
 
 def body_colors(body: Body, person: int) -> Float64Array:
@@ -182,8 +181,7 @@ def body_colors(body: Body, person: int) -> Float64Array:
         return np.tile(tint(person), (len(body.faces), 1))
     linear = np.clip(body.material_colors[:, :3], 0, 1)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    colors: Float64Array = (0.85 * tint(person) + 0.15 * srgb)[body.face_material]
-    return colors
+    return (0.85 * tint(person) + 0.15 * srgb)[body.face_material]
 
 
 def camera_vertices(motion: Motion, body: Body, row: int) -> Float64Array:

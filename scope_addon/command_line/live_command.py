@@ -361,8 +361,7 @@ def _summary(report: Mapping[str, Any]) -> str:
     latency = report["latency_ms"]
     return (
         f"{counted(report['poses'], 'pose')}, {report['poses_per_second']:g}/s, latency "
-        f"{latency['median']:.0f} ms"
-        f" (p95 {latency['p95']:.0f} ms), {report['dropped']} of "
+        f"{latency['median']:.0f} ms (p95 {latency['p95']:.0f} ms), {report['dropped']} of "
         f"{counted(report['frames'], 'frame')} dropped"
         + (f", {report['damaged']} more damaged and left out" if report["damaged"] else "")
         + written

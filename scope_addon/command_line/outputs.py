@@ -401,6 +401,5 @@ def summary(report: dict[str, Any]) -> str:
     return (
         f"{people}, {counted(report['frames'], 'frame')}, {report['fps']['total']:.1f} frames/s, "
         f"reprojection error {report['reprojection_px']:.1f} px, networks on "
-        f"{report['execution']}; "
-        f"wrote {', '.join(report['outputs'])}"
+        f"{report['execution']}; wrote {', '.join(report['outputs'])}"
     )

@@ -195,8 +195,7 @@ class Cache:
         reason = error.strerror or error
         return OutputError(
             f"cannot write to the cache folder {self.root}: {reason}; free some space or choose "
-            "another folder in the "
-            "preferences"
+            "another folder in the preferences"
         )
 
     def _owned(self) -> list[Path]:

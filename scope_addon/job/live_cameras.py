@@ -236,16 +236,14 @@ class FormatsProcess(WorkerProcess):
         if time.monotonic() - self._began_s > ANSWER_S:
             raise WorkerFailedError(
                 f"camera {self.source} has not reported its formats within {ANSWER_S:.0f} s; if "
-                "the system asks "
-                "for permission to use it, answer, and try again"
+                "the system asks for permission to use it, answer, and try again"
             )
         return None
 
     def _cause_of_end(self) -> str:
         return (
             f"camera {self.source} cannot be asked for its formats; check that it is plugged in, "
-            "and that this program"
-            " may use cameras"
+            "and that this program may use cameras"
         )
 
 

@@ -166,10 +166,7 @@ def draw(
             large = _with_body(large, pose, scale * _SUPERSAMPLE)
         else:
             _draw_skeleton(large, person, scale * _SUPERSAMPLE)
-    rgba: NDArray[Any] = cv2.cvtColor(
-        cv2.resize(large, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2RGBA
-    )
-    return rgba
+    return cv2.cvtColor(cv2.resize(large, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2RGBA)
 
 
 def _with_body(image: NDArray[np.uint8], pose: LivePose, scale: float) -> NDArray[np.uint8]:

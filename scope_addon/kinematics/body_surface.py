@@ -191,8 +191,7 @@ def _vertex_normals(body: Body, betas: FloatArray) -> Float64Array:
     for corner in range(3):
         np.add.at(normals, triangles[:, corner], areas if volume > 0.0 else -areas)
     length: Float64Array = np.linalg.norm(normals, axis=1, keepdims=True)
-    unit: Float64Array = normals / np.maximum(length, np.finfo(float).tiny)
-    return unit
+    return normals / np.maximum(length, np.finfo(float).tiny)
 
 
 def one_per_cell(points: FloatArray, side_m: float) -> IndexArray:

@@ -111,8 +111,7 @@ def depth_under_floor(motion: Motion, body: Body) -> Float64Array:
     """
     if motion.uneven_ground:
         return np.zeros(len(motion))
-    depth: Float64Array = np.maximum(-foot_heights(motion, body).min(axis=1), 0.0)
-    return depth
+    return np.maximum(-foot_heights(motion, body).min(axis=1), 0.0)
 
 
 def lower_floors(

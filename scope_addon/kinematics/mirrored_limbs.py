@@ -44,8 +44,7 @@ def bone_depths(
     :param ends: (T, 3) the next one.
     :param center: (T, 3) the camera.
     """
-    depths: Float64Array = ((ends - starts) * line_of_sight(ends - center)).sum(axis=1)
-    return depths
+    return ((ends - starts) * line_of_sight(ends - center)).sum(axis=1)
 
 
 def runs_of_one_sign(depths: FloatArray, shallow: float, deep: float) -> list[slice]:
@@ -99,5 +98,4 @@ def _mirrored(
     bone = ends - starts
     sight = line_of_sight(ends - center)
     other = bone - 2.0 * (bone * sight).sum(axis=1, keepdims=True) * sight
-    turned: FloatArray = shortest_turn(bone, other) @ R
-    return turned
+    return shortest_turn(bone, other) @ R

@@ -41,14 +41,27 @@ def fill_gaps(values: FloatArray, valid: BoolArray, times: Float64Array) -> Floa
 def continuous_quaternions(R: FloatArray) -> Float64Array:
     """Convert rotations to unit quaternions whose sign does not change from frame to frame.
 
-    :param R: (T, J, 3, 3) rotation matrices.
-    :return: (T, J, 4) quaternions (w, x, y, z).
+    :param R: (T, ..., 3, 3) rotation matrices.
+    :return: (T, ..., 4) quaternions (w, x, y, z).
     """
-    q: Float64Array = quaternion_from_matrix(np.asarray(R, float))
-    dots = (q[1:] * q[:-1]).sum(-1)
+    return on_one_hemisphere(quaternion_from_matrix(np.asarray(R, float)))
+
+
+def on_one_hemisphere(quaternions: Float64Array) -> Float64Array:
+    """Choose the signs of quaternions so that consecutive ones are on one hemisphere; q and −q are
+    the same rotation.
+
+    Blender interpolates the four components separately: a change of sign would make a bone spin
+    between two keys.
+
+    :param quaternions: (T, ..., 4).
+    :return: (T, ..., 4).
+    """
+    dots = (quaternions[1:] * quaternions[:-1]).sum(axis=-1)
     signs = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0)
-    q[1:] *= signs[..., None]
-    return q
+    out = quaternions.copy()
+    out[1:] *= signs[..., None]
+    return out
 
 
 def fill_rotation_gaps(R: FloatArray, valid: BoolArray, times: Float64Array) -> FloatArray:
@@ -130,8 +143,7 @@ def gaussian_smooth(values: FloatArray, times: Float64Array, cutoff_hz: float) -
         w = np.exp(-0.5 * ((times[start] - times[to]) / sigma) ** 2)
         total[to] += w[:, None] * flat[start]
         weight[to] += w
-    smooth: Float64Array = (total / weight[:, None]).reshape(values.shape)
-    return smooth
+    return (total / weight[:, None]).reshape(values.shape)
 
 
 def smooth_rotations(
@@ -170,7 +182,4 @@ def smooth_root(
     distance = np.maximum(np.linalg.norm(t_camera_root, axis=1, keepdims=True), 1e-6)
     ray = gaussian_smooth(t_camera_root / distance, times, ROTATION_CUTOFF_HZ / strength)
     ray /= np.maximum(np.linalg.norm(ray, axis=1, keepdims=True), 1e-6)
-    smooth: FloatArray = ray * np.exp(
-        gaussian_smooth(np.log(distance), times, DEPTH_CUTOFF_HZ / strength)
-    )
-    return smooth
+    return ray * np.exp(gaussian_smooth(np.log(distance), times, DEPTH_CUTOFF_HZ / strength))

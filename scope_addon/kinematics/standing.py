@@ -35,8 +35,7 @@ def line_of_sight(position: FloatArray) -> FloatArray:
     """Return the (..., 3) unit vectors from the camera's centre to positions (..., 3) relative to
     it.
     """
-    unit: FloatArray = position / np.maximum(np.linalg.norm(position, axis=-1, keepdims=True), 1e-9)
-    return unit
+    return position / np.maximum(np.linalg.norm(position, axis=-1, keepdims=True), 1e-9)
 
 
 def standing_probability(
@@ -118,8 +117,7 @@ def speed_across(
     :param times: (T,) seconds.
     :param center: (T, 3) or (3,) the camera's centre; None: the whole speed.
     """
-    speed: FloatArray = np.linalg.norm(velocity_across(points, times, center), axis=-1)
-    return speed
+    return np.linalg.norm(velocity_across(points, times, center), axis=-1)
 
 
 def velocity_across(
@@ -154,8 +152,7 @@ def _downward_acceleration(velocity: FloatArray, up: FloatArray, times: Float64A
     down = -np.gradient(velocity @ up, times, axis=0)
     # Differences of the two outermost frames alone are mostly noise.
     down[0], down[-1] = down[1], down[-2]
-    falling: FloatArray = np.maximum(down, 0.0)
-    return falling
+    return np.maximum(down, 0.0)
 
 
 def logistic(x: FloatArray | float) -> FloatArray:

@@ -109,8 +109,7 @@ class CameraSource(Source):
         if not capture.isOpened():
             raise VideoError(
                 f"{self.name} cannot be opened; check that it is plugged in, that no other program "
-                "uses it, and that "
-                "this one may use cameras"
+                "uses it, and that this one may use cameras"
             )
         # uncompressed, USB carries 10 frames/s
         capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*"MJPG"))

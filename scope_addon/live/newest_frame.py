@@ -235,8 +235,7 @@ class NewestFrame:
             self._damage_said_s = self.now()
             self._say(
                 f"data of {self._source.name} was lost or damaged in transmission; damaged images "
-                "are left out, for at"
-                f" most {DAMAGED_S:g} s each time"
+                f"are left out, for at most {DAMAGED_S:g} s each time"
             )
 
     def _report_pause(self, seconds: float) -> None:

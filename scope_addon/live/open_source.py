@@ -42,7 +42,6 @@ def open_source(text: str, *, online: bool = True) -> Source:
     if not Path(text).exists():
         raise VideoError(
             f"{text} does not exist; check the path, give a camera as a number such as 0, and a "
-            "stream with its kind,"
-            " as in rtsp://192.168.1.20/stream"
+            "stream with its kind, as in rtsp://192.168.1.20/stream"
         )
     return FileSource(Path(text))

@@ -55,8 +55,7 @@ class LivePose:
     @property
     def R_world_root(self) -> Float64Array:
         """Rotation (3, 3) of the pelvis."""
-        R: Float64Array = self.T_world_camera[:3, :3] @ self.rotations[0]
-        return R
+        return self.T_world_camera[:3, :3] @ self.rotations[0]
 
 
 def values(pose: LivePose, latency_ms: float) -> dict[str, Any]:

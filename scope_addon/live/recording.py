@@ -89,8 +89,7 @@ class Recording:
         if not self._poses or self._session is None or self._session.camera is None:
             raise NoPersonError(
                 f"nobody was seen in {self._source.name}, so nothing was recorded; at least one "
-                "person must be mostly "
-                "in the image"
+                "person must be mostly in the image"
             )
         motion = self.motion(self._session.camera)
         if origin is not None:
@@ -296,8 +295,7 @@ def _raised(
         )
         return float((contact_point_positions(with_points, R, t)[: len(SOLES)] @ up).min())
 
-    raised: FloatArray = root_cam + (lowest_sole(pose.betas) - lowest_sole(betas)) * up
-    return raised
+    return root_cam + (lowest_sole(pose.betas) - lowest_sole(betas)) * up
 
 
 @dataclass(frozen=True)

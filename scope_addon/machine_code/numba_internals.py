@@ -35,8 +35,7 @@ TESTED_BEFORE = (0, 69)
 if not TESTED_FROM <= numba.version_info[:2] < TESTED_BEFORE:
     raise ImportError(
         f"Scope keeps machine code in a way that was not tested with numba {numba.__version__}: "
-        f"install numba >= {'.'.join(map(str, TESTED_FROM))}, < "
-        f"{'.'.join(map(str, TESTED_BEFORE))}"
+        f"install numba >= {'.'.join(map(str, TESTED_FROM))}, < {'.'.join(map(str, TESTED_BEFORE))}"
     )
 
 _codegen: Any = numba.core.codegen  # these declare no types

@@ -324,8 +324,7 @@ class CaptureDeclaration:
             "height_cm",
             "Height (cm)",
             "Height of the most prominent person in centimetres; sets the scale of the scene. 0: "
-            "estimated from the"
-            " footage, for adults usually within 10 %; enter that of a child",
+            "estimated from the footage, for adults usually within 10 %; enter that of a child",
             unit="cm",
             default=0.0,
             minimum=0.0,

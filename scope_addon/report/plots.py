@@ -44,10 +44,8 @@ class Axis:
     def share(self, values: Array) -> Array:
         """Return where values (n,) lie between ``low``, 0, and ``high``, 1: (n,)."""
         if self.logarithmic:
-            shares: Array = np.log(np.asarray(values) / self.low) / math.log(self.high / self.low)
-            return shares
-        linear: Array = (np.asarray(values) - self.low) / (self.high - self.low)
-        return linear
+            return np.log(np.asarray(values) / self.low) / math.log(self.high / self.low)
+        return (np.asarray(values) - self.low) / (self.high - self.low)
 
     def ticks(self, count: int = 5) -> list[float]:
         """Return at most about ``count`` round values between the ends, both included where they
@@ -265,10 +263,8 @@ def _svg(label: str, area_px: int, drawn: Sequence[str], above: Sequence[str], t
     height = _TOP_PX + area_px + _AXIS_PX
     return (
         f'<svg class="plot{" timed" if timed else ""}" role="img" aria-label="{escape(label)}" '
-        'width="100%" '
-        f'height="{height}"><svg class="area" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" '
-        'preserveAspectRatio="none" x="0" '
-        f'y="{_TOP_PX}" width="100%" '
+        f'width="100%" height="{height}"><svg class="area" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" '
+        f'preserveAspectRatio="none" x="0" y="{_TOP_PX}" width="100%" '
         f'height="{area_px}">{"".join(drawn)}</svg>{"".join(above)}</svg>'
     )
 

@@ -110,8 +110,7 @@ def quantized_weights(weights: NDArray[np.float64]) -> NDArray[np.uint8]:
     integers = np.round(255 * weights).astype(int)
     largest = integers.argmax(axis=1)
     integers[np.arange(len(integers)), largest] += 255 - integers.sum(axis=1)
-    narrow: NDArray[np.uint8] = integers.astype(np.uint8)
-    return narrow
+    return integers.astype(np.uint8)
 
 
 def quantized_rotations(poses: NDArray[np.float64]) -> NDArray[np.int16]:
@@ -123,5 +122,4 @@ def quantized_rotations(poses: NDArray[np.float64]) -> NDArray[np.int16]:
     vector = 0.5 * np.sinc(angle / (2 * np.pi)) * poses
     quaternions = np.concatenate([np.cos(angle / 2), vector], axis=-1)
     quaternions *= np.where(quaternions[..., :1] < 0, -1, 1)
-    narrow: NDArray[np.int16] = np.round(_QUATERNION * quaternions).astype(np.int16)
-    return narrow
+    return np.round(_QUATERNION * quaternions).astype(np.int16)

@@ -120,8 +120,7 @@ def read_header(file: IO[bytes], key: str) -> tuple[tuple[int, ...], bool, np.dt
         raise ModelFileError(
             f"{key} is stored in version {version} of numpy's format; save it with a current numpy"
         )
-    header: tuple[tuple[int, ...], bool, np.dtype[Any]] = _HEADER_READERS[version](file)
-    return header
+    return _HEADER_READERS[version](file)
 
 
 LARGEST_BYTES = 4 << 30  # unpacked; an hour of SMPL+H motion at 60 fps takes a quarter of this

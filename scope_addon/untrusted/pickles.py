@@ -149,8 +149,7 @@ def _reconstruct(kind: object, *_: object) -> PickledArray:
 def _reconstructor(kind: Any, base: object, state: object) -> PickledObject:
     if kind not in _CLASSES.values() or base is not _OBJECT or state is not None:
         _refuse()
-    made: PickledObject = kind()
-    return made
+    return kind()
 
 
 def _from_buffer(raw: object, dtype: object, shape: object, order: object) -> PickledArray:

@@ -180,8 +180,7 @@ def best_rotation(products: Float64Array) -> Float64Array:
     """
     U, _, Vt = np.linalg.svd(products)
     U[..., :, 2] *= np.sign(np.linalg.det(U @ Vt))[..., None]
-    R: Float64Array = U @ Vt
-    return R
+    return U @ Vt
 
 
 def joined_backgrounds(

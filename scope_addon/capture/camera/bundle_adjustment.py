@@ -184,14 +184,12 @@ def narrowing_weights(residuals: Float64Array, scale: float, step: int) -> Float
     eight times as wide as ``scale`` in the first step, and half as wide in each further one.
     """
     width = scale * max(1.0, 8.0 * 0.5**step)
-    weight: Float64Array = 1.0 / (1.0 + (residuals**2).sum(axis=1) / width**2) ** 2
-    return weight
+    return 1.0 / (1.0 + (residuals**2).sum(axis=1) / width**2) ** 2
 
 
 def projected(points: Float64Array) -> Float64Array:
     """Return x / z and y / z of points (..., 3); those behind the camera count as near it."""
-    flat: Float64Array = points[..., :2] / np.maximum(points[..., 2:], _NEAREST)
-    return flat
+    return points[..., :2] / np.maximum(points[..., 2:], _NEAREST)
 
 
 def projection_jacobian(points: Float64Array) -> Float64Array:

@@ -116,17 +116,15 @@ class Calibration:
         if not _same_proportions((known_width, known_height), (width, height)):
             raise InputError(
                 f"{self.path} is for images of {known_width:g} x {known_height:g}, the footage has "
-                f"{width} x {height}"
-                " pixels, which is a different aspect ratio; "
+                f"{width} x {height} pixels, which is a different aspect ratio; "
                 f"{_advice(known_width, known_height, width, height)}"
             )
         longer = max(known_width, known_height)
         if not all(_FOCAL_RANGE[0] * longer <= K[i, i] <= _FOCAL_RANGE[1] * longer for i in (0, 1)):
             raise InputError(
                 f"{self.path}: no lens has focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels in "
-                "images of "
-                f"{known_width:g} x {known_height:g}; give them in pixels, with the size of the "
-                "calibration images"
+                f"images of {known_width:g} x {known_height:g}; give them in pixels, with the size "
+                "of the calibration images"
             )
         if not 1 / _LARGEST_PIXEL_ASPECT <= K[0, 0] / K[1, 1] <= _LARGEST_PIXEL_ASPECT:
             raise InputError(
@@ -143,8 +141,7 @@ class Calibration:
         if not _can_be_undistorted(self.dist, min(known_width, known_height) / (K[0, 0] + K[1, 1])):
             raise InputError(
                 f"{self.path}: dist {self.dist.tolist()} folds or tears the image; give OpenCV's "
-                "k1, k2, p1, p2, k3, "
-                "in this order, from the same calibration as the intrinsics"
+                "k1, k2, p1, p2, k3, in this order, from the same calibration as the intrinsics"
             )
         return np.diag([width / known_width, height / known_height, 1.0]) @ K
 
@@ -391,9 +388,8 @@ def _distortion(path: Path, value: Any) -> Float64Array:
     if dist.size > _BROWN_COUNT:
         raise InputError(
             f"{path}: dist has {dist.size} numbers, but motion files and Blender's lens support "
-            "only k1, k2, p1, p2, "
-            "k3; calibrate again with these five (OpenCV's calibrateCamera without flags), or "
-            "undistort the video first"
+            "only k1, k2, p1, p2, k3; calibrate again with these five (OpenCV's calibrateCamera "
+            "without flags), or undistort the video first"
         )
     return np.concatenate([dist, np.zeros(_BROWN_COUNT - dist.size)])
 

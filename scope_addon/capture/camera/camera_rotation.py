@@ -215,8 +215,7 @@ class BackgroundTracker:
         image.
         """
         rays = self._camera.rays(self._to_full(points))
-        unit: Float64Array = rays / np.linalg.norm(rays, axis=1, keepdims=True)
-        return unit
+        return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
     def _to_full(self, points: Float32Array) -> Float32Array:
         """Return points (n, 2) of the working image in the full one; OpenCV scales areas, not
@@ -286,8 +285,7 @@ class HiddenBackground:
         column, row = (
             np.clip((points + 0.5) / self._cell_px, 0, CELLS - 1).astype(int).reshape(-1, 2).T
         )
-        hidden: BoolArray = self._hidden[row * CELLS + column]
-        return hidden
+        return self._hidden[row * CELLS + column]
 
     def _covered(self, people: Sequence[NDArray[Any]]) -> BoolArray:
         """Return whether each cell is wholly behind one of the people."""

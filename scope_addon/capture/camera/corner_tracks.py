@@ -79,8 +79,7 @@ def corners_at_rest(
     rests = is_known & (off < tolerance)
     if rests.sum() < MIN_RESTING_SHARE * is_known.sum():
         return np.zeros((0, 3))
-    resting: Float64Array = mean[rests]
-    return resting
+    return mean[rests]
 
 
 def joined_corners(parts: Sequence[CornerTracks]) -> CornerTracks:

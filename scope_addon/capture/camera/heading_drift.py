@@ -98,8 +98,7 @@ def remove_heading_drift(
     vectors = np.array([np.zeros(3), *(vector for _, vector in known)])
     drifts = interpolated_places(vectors, times[rows], times)
     corrected: Float64Array = exp(gaussian_smooth(drifts, times, DRIFT_CUTOFF_HZ)) @ R_first_camera
-    aligned: Float64Array = corrected[0].T @ corrected
-    return aligned
+    return corrected[0].T @ corrected
 
 
 def _drift(

@@ -6,10 +6,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...arrays import Float64Array, FloatArray, round_number
 from ...errors import UsageError
@@ -58,8 +56,7 @@ class Camera:
 
         flat = np.ascontiguousarray(points_px, float).reshape(-1, 1, 2)
         undistorted = cv2.undistortPoints(flat, self.intrinsics, self.dist, P=self.intrinsics)
-        reshaped: NDArray[Any] = undistorted.reshape(points_px.shape)
-        return reshaped
+        return undistorted.reshape(points_px.shape)
 
     def zoomed(self, zoom: float) -> Camera:
         """Return the camera with ``zoom`` times the focal length."""
@@ -75,8 +72,7 @@ class Camera:
     def at_zoom(self, points_px: FloatArray, zoom: FloatArray | float) -> FloatArray:
         """Return where pixels (..., 2) are with ``zoom`` times the focal length."""
         center = self.intrinsics[:2, 2]
-        moved: FloatArray = center + zoom * (points_px - center)
-        return moved
+        return center + zoom * (points_px - center)
 
     def rays(self, points_px: FloatArray) -> Float64Array:
         """Return the (..., 3) lines of sight of pixels (..., 2), in camera axes, with z = 1."""

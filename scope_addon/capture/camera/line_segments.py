@@ -85,8 +85,7 @@ def plane_normals(rays: FloatArray) -> NDArray[Any]:
     :param rays: (N, 2, 3) directions to the ends of each edge.
     """
     normals = np.cross(rays[:, 0], rays[:, 1])
-    unit: NDArray[Any] = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    return unit
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
 
 def find_segments(

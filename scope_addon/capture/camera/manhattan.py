@@ -157,8 +157,7 @@ def _sine2(directions: NDArray[Any], equations: Float32Array) -> NDArray[Any]:
     squares *= squares
     x2, y2, across2 = np.split(squares, 3, axis=1)
     x2 += y2
-    sine2: NDArray[Any] = across2 / np.maximum(x2, np.float32(1e-12), out=x2)
-    return sine2
+    return across2 / np.maximum(x2, np.float32(1e-12), out=x2)
 
 
 def _explained(sine2: NDArray[Any]) -> NDArray[Any]:
@@ -166,8 +165,7 @@ def _explained(sine2: NDArray[Any]) -> NDArray[Any]:
     1: exactly.
     """
     sine2 *= np.float32(-0.5 / EDGE_SIGMA**2)
-    explained: NDArray[Any] = np.exp(sine2, out=sine2)
-    return explained
+    return np.exp(sine2, out=sine2)
 
 
 def intersection_directions(normals: NDArray[Any], up: Float64Array) -> NDArray[Any]:
@@ -179,8 +177,7 @@ def intersection_directions(normals: NDArray[Any], up: Float64Array) -> NDArray[
     size = np.linalg.norm(v, axis=1)
     v = v[size > 0.02] / size[size > 0.02, None]
     v *= np.where(v @ up < 0, -1.0, 1.0)[:, None]
-    near: NDArray[Any] = v[v @ up > np.cos(MAX_TILT)]
-    return near
+    return v[v @ up > np.cos(MAX_TILT)]
 
 
 def line_normal_equations(

@@ -154,8 +154,7 @@ class _Part:
     @property
     def centers(self) -> Float64Array:
         """The camera's places (n, 3)."""
-        centers: Float64Array = -np.einsum("nji,nj->ni", self.R, self.t)
-        return centers
+        return -np.einsum("nji,nj->ni", self.R, self.t)
 
     def since(self, first: int) -> _Part:
         """Return the part without the sightings before a number."""
@@ -395,8 +394,7 @@ class Turn:
     @property
     def assumed_rotation(self) -> Float64Array:
         """The rotation (3, 3) that moves the picture as much by the assumed focal length."""
-        rotation: Float64Array = exp(log(self.R) * [self.focal, self.focal, 1.0])
-        return rotation
+        return exp(log(self.R) * [self.focal, self.focal, 1.0])
 
     @classmethod
     def nearest(cls, H: Float64Array) -> Turn:
@@ -425,8 +423,7 @@ class Turn:
 
     def explains(self, rays_a: Float64Array, rays_b: Float64Array, tolerance: float) -> BoolArray:
         """Return (n,) whether the turn takes lines of sight (n, 2) to others (n, 2)."""
-        explained: BoolArray = np.linalg.norm(self.residuals(rays_a, rays_b), axis=1) < tolerance
-        return explained
+        return np.linalg.norm(self.residuals(rays_a, rays_b), axis=1) < tolerance
 
     def refined(
         self, rays_a: Float64Array, rays_b: Float64Array, scale: float, steps: int = TURN_STEPS

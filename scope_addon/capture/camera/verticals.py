@@ -110,8 +110,7 @@ def _grid(up: Float64Array) -> Float64Array:
     steps = np.tan(np.arange(-MAX_LEAN, MAX_LEAN + 1e-9, GRID_STEP))
     v = up + (steps[:, None, None] * across[0] + steps[:, None] * across[1]).reshape(-1, 3)
     v /= np.linalg.norm(v, axis=1, keepdims=True)
-    near: Float64Array = v[v @ up > np.cos(MAX_LEAN)]
-    return near
+    return v[v @ up > np.cos(MAX_LEAN)]
 
 
 def _best_on_grid(lines: Lines, up: Float64Array) -> Float64Array:
@@ -121,8 +120,7 @@ def _best_on_grid(lines: Lines, up: Float64Array) -> Float64Array:
     ups = _grid(up)
     found = [_best_with_ups(ups[k : k + _BLOCK], lines) for k in range(0, len(ups), _BLOCK)]
     support, axes = (np.concatenate(each) for each in zip(*found, strict=True))
-    best: Float64Array = axes[np.argsort(-_score(support, ups, up), kind="stable")[:MAX_REFINED]]
-    return best
+    return axes[np.argsort(-_score(support, ups, up), kind="stable")[:MAX_REFINED]]
 
 
 def _best_with_ups(ups: Float64Array, lines: Lines) -> tuple[Float64Array, Float64Array]:
@@ -170,7 +168,4 @@ def _refined(directions: Float64Array, lines: Lines, up: Float64Array) -> list[_
 
 def _score(support: Float64Array, u: Float64Array, up: Float64Array) -> Float64Array:
     """Return the scores (n,) of up directions (n, 3) that explain so much."""
-    scores: Float64Array = KAPPA * support - 0.5 * np.square(
-        np.arccos(np.clip(u @ up, -1.0, 1.0)) / BODY_SIGMA
-    )
-    return scores
+    return KAPPA * support - 0.5 * np.square(np.arccos(np.clip(u @ up, -1.0, 1.0)) / BODY_SIGMA)

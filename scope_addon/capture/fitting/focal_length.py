@@ -124,8 +124,7 @@ def focal_from_edges(
 
 
 def _log_posterior(log_ratio: Float64Array, scores: list[float]) -> Float64Array:
-    log_p: Float64Array = KAPPA * np.array(scores) - 0.5 * np.square(log_ratio / ASSUMED_DEVIATION)
-    return log_p
+    return KAPPA * np.array(scores) - 0.5 * np.square(log_ratio / ASSUMED_DEVIATION)
 
 
 def _moments(log_ratio: Float64Array, log_p: Float64Array) -> tuple[float, float]:
@@ -188,8 +187,7 @@ def costs_before_zoom(costs: Float64Array, zoom: float) -> Float64Array:
     """Return the (5,) costs at focal lengths of the first frame, of a frame with ``zoom`` times as
     long ones.
     """
-    shifted: Float64Array = np.interp(LOG_RATIOS + np.log(zoom), LOG_RATIOS, costs)
-    return shifted
+    return np.interp(LOG_RATIOS + np.log(zoom), LOG_RATIOS, costs)
 
 
 def log_likelihood(costs: list[Float64Array], log_ratio: Float64Array) -> Float64Array:

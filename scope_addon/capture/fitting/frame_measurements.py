@@ -85,8 +85,7 @@ class Measurer:
 
     def rays(self, pixels: FloatArray) -> FloatArray:
         """Convert undistorted pixels (..., 2) to normalized image coordinates (..., 2)."""
-        normalized: FloatArray = pixels @ self._unproject[:2, :2].T + self._unproject[:2, 2]
-        return normalized
+        return pixels @ self._unproject[:2, :2].T + self._unproject[:2, 2]
 
     def measure(
         self,

@@ -161,8 +161,7 @@ class HandMeasurer:
         rays = hands[..., :2].mean(axis=1) @ self._unproject[:2, :2].T + self._unproject[:2, 2]
         R_virtual_camera = camera_towards(rays)
         world = hands[..., 3:6]
-        bones: FloatArray = (world[:, self._to] - world[:, self._from]) @ R_virtual_camera
-        return bones
+        return (world[:, self._to] - world[:, self._from]) @ R_virtual_camera
 
     def joint_confidence(self, hands: FloatArray) -> Float64Array:
         """Return (T, K+1), the confidence of the hand of each wrist and finger joint, of hands (T,

@@ -217,8 +217,7 @@ def usable_masks(prepared: PreparedTrack) -> list[tuple[int, PersonMask]]:
 def spread(indices: IndexArray, count: int) -> IndexArray:
     """Return at most ``count`` of indices (n,), evenly spread."""
     rows = np.unique(np.linspace(0, len(indices) - 1, min(count, len(indices))).round().astype(int))
-    chosen: IndexArray = indices[rows]
-    return chosen
+    return indices[rows]
 
 
 def fit_shape_to_outline(

@@ -117,8 +117,7 @@ def open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]:
     except ImportError as error:
         raise VideoError(
             f"{path} is a video, HEIC or AVIF, which needs the package 'av' that is not installed; "
-            "install it, or give "
-            "JPEG or PNG images"
+            "install it, or give JPEG or PNG images"
         ) from error
     try:
         with utf8_name(path) as name:
@@ -159,8 +158,7 @@ def film_of(path: Path, container: InputContainer) -> av.VideoStream:
 def _undecodable(path: Path) -> VideoError:
     return VideoError(
         f"{path} is not a video or image that can be decoded; copy it again if it may be "
-        "incomplete, or convert it to "
-        "an H.264 .mp4"
+        "incomplete, or convert it to an H.264 .mp4"
     )
 
 

@@ -31,8 +31,7 @@ def check_size(path: Path, width: float, height: float) -> None:
     if longer > MAX_RATIO * max(shorter, 1):
         raise VideoError(
             f"{path} shows {width:.0f} × {height:.0f} pixels, and footage may be at most "
-            f"{MAX_RATIO:.0f} times as long "
-            "as it is wide; crop it around the person"
+            f"{MAX_RATIO:.0f} times as long as it is wide; crop it around the person"
         )
 
 

@@ -40,8 +40,7 @@ def loudness(path: Path) -> Float32Array | None:
     powers = np.concatenate(chunks) if chunks else np.zeros((0, len(_BANDS_HZ) - 1))
     if not len(powers) or powers.max() <= _SILENCE:
         return None
-    logarithm: Float32Array = np.log(powers + _SILENCE).astype(np.float32)
-    return logarithm
+    return np.log(powers + _SILENCE).astype(np.float32)
 
 
 def _samples(container, start_s: float) -> Iterator[Float32Array]:  # type: ignore[no-untyped-def]

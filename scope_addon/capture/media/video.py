@@ -240,8 +240,7 @@ def open_video(path: str | Path, wanted: FootageRange | None = None) -> Video:
     if path.is_dir():
         raise VideoError(
             f"{path} is a folder that contains no images; give a video, an image or a folder of "
-            "images,"
-            " or capture a folder of videos with scope batch"
+            "images, or capture a folder of videos with scope batch"
         )
     try:
         status = path.stat()

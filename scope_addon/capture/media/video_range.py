@@ -225,16 +225,14 @@ class Timecode:
         if rate not in _DROP_RATES or abs(fps - Fraction(rate * 1000, 1001)) > _SAME_RATE * rate:
             raise UsageError(
                 f"{self} is drop-frame timecode, which is for 29.97 and 59.94 frames per second, "
-                "and the footage has "
-                f"{float(fps):.5g}; write a colon before the frames"
+                f"and the footage has {float(fps):.5g}; write a colon before the frames"
             )
         dropped = rate // 15
         minute = 60 * self.hours + self.minutes
         if self.minutes % 10 and self.seconds == 0 and self.frames < dropped:
             raise UsageError(
                 f"{self} does not exist: drop-frame timecode omits the first {dropped} frame "
-                "numbers of this minute; "
-                f"the first one is {dropped:02}"
+                f"numbers of this minute; the first one is {dropped:02}"
             )
         return number - dropped * (minute - minute // 10)
 

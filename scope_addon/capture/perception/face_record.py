@@ -108,8 +108,7 @@ def presence_of(rows: FloatArray) -> FloatArray:
     not where small.
     """
     of_size = np.maximum(_ramp(rows[:, 1], *_FACE_PX), 1e-3)
-    found: FloatArray = np.minimum(rows[:, 0] / of_size, 1.0)
-    return found
+    return np.minimum(rows[:, 0] / of_size, 1.0)
 
 
 def with_expression(
@@ -133,8 +132,7 @@ def noise_of_size(size: FloatArray) -> FloatArray:
     """Return by how much errors of landmarks exceed those of a large face (T,), of faces of a size
     (T,) in pixels: by the inverse of the area.
     """
-    noise: FloatArray = np.clip((_SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MAX_NOISE)
-    return noise
+    return np.clip((_SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MAX_NOISE)
 
 
 def _ramp(value: Any, low: float, high: float) -> Any:

@@ -209,13 +209,11 @@ class LandmarkNetwork:
 
 def _probability(logits: Float32Array) -> Float32Array:
     """Return the mask (256, 256) of the network's output (1, 1, 256, 256)."""
-    probability: Float32Array = _sigmoid(logits[0, 0])
-    return probability
+    return _sigmoid(logits[0, 0])
 
 
 def _sigmoid(logits: FloatArray) -> FloatArray:
-    probability: FloatArray = 1.0 / (1.0 + np.exp(-np.clip(logits, -50.0, 50.0)))
-    return probability
+    return 1.0 / (1.0 + np.exp(-np.clip(logits, -50.0, 50.0)))
 
 
 def _blob(crop_rgb: Uint8Array) -> Float32Array:

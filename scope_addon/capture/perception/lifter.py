@@ -95,8 +95,7 @@ def person_size(image_points: FloatArray) -> FloatArray:
     """Calculate s (T,) of the module's equation from points (T, 33, 2), in the points' unit."""
     limbs = image_points[:, LIMBS]
     square = np.square(limbs - limbs.mean(axis=1, keepdims=True)).sum(axis=-1).mean(axis=-1)
-    size: FloatArray = np.maximum(np.sqrt(square), 1e-4)
-    return size
+    return np.maximum(np.sqrt(square), 1e-4)
 
 
 def network_input(

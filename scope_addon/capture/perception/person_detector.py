@@ -63,8 +63,7 @@ class Detection:
     @property
     def trunk_px(self) -> Float64Array:
         """The vector (2,) from the shoulders to the hips."""
-        vector: Float64Array = self.points_px[0] - self.points_px[2]
-        return vector
+        return self.points_px[0] - self.points_px[2]
 
     def near(self, others: list[Detection]) -> list[Detection]:
         """Select those of similar size with the hips well inside the body circle."""

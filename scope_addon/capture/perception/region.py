@@ -122,14 +122,12 @@ class Region:
     def image_from_crop(self, points: Float64Array) -> Float64Array:
         """Convert crop coordinates (..., 2) to pixels: p = center + side · R · (s − ½)."""
         offset = self.side_px * (np.asarray(points) - 0.5) @ self.R_image_crop.T
-        pixels: Float64Array = np.asarray(self.center_px) + offset
-        return pixels
+        return np.asarray(self.center_px) + offset
 
     def crop_from_image(self, points: Float64Array) -> Float64Array:
         """Convert pixels (..., 2) to crop coordinates, the inverse of `image_from_crop`."""
         offset = np.asarray(points) - np.asarray(self.center_px)
-        cropped: Float64Array = offset @ self.R_image_crop / self.side_px + 0.5
-        return cropped
+        return offset @ self.R_image_crop / self.side_px + 0.5
 
     def image_from_pixels(self, size: int) -> Float64Array:
         """Return the affine map (2, 3) from the pixels of a crop (size, size) to the image's."""

@@ -32,8 +32,7 @@ def best_camera(scores: Float64Array, times: Float64Array) -> IndexArray:
     :param times: (T,) seconds.
     """
     calm = gaussian_smooth(scores.T, times, COMPARED_HZ).T
-    best: IndexArray = np.argmax(np.where(scores > 0.0, calm, -1.0), axis=0)
-    return best
+    return np.argmax(np.where(scores > 0.0, calm, -1.0), axis=0)
 
 
 def with_best_hands(tracks: Sequence[Track]) -> list[Track]:

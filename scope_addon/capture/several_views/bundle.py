@@ -80,24 +80,20 @@ class CameraPlace:
 
     def of(self, points: Float64Array) -> Float64Array:
         """Return points (..., 3) of the first camera's axes in this camera's."""
-        moved: Float64Array = points @ self.R_camera_first.T + self.t_camera_first
-        return moved
+        return points @ self.R_camera_first.T + self.t_camera_first
 
     def own_times(self, times: Float64Array) -> Float64Array:
         """Return times (...) of the first camera's clock as this one's shows them, seconds."""
-        own: Float64Array = times + self.offset_s + self.drift * times
-        return own
+        return times + self.offset_s + self.drift * times
 
     def first_times(self, times: Float64Array) -> Float64Array:
         """Return times (...) of this camera's clock as the first one's shows them, seconds."""
-        first: Float64Array = (times - self.offset_s) / (1.0 + self.drift)
-        return first
+        return (times - self.offset_s) / (1.0 + self.drift)
 
     @property
     def center(self) -> Float64Array:
         """The camera in the first camera's axes, metres."""
-        center: Float64Array = -self.R_camera_first.T @ self.t_camera_first
-        return center
+        return -self.R_camera_first.T @ self.t_camera_first
 
 
 @dataclass(frozen=True)
@@ -195,8 +191,7 @@ def triangulate(
         A += across
         b += across @ camera.center
     A += 1e-9 * np.eye(3)
-    points: Float64Array = np.linalg.solve(A, b[..., None])[..., 0]
-    return points
+    return np.linalg.solve(A, b[..., None])[..., 0]
 
 
 def _moved(place: CameraPlace, step: Float64Array, mean_s: float) -> CameraPlace:
@@ -239,8 +234,7 @@ class _System:
         free = self.is_free
         variance = np.zeros(len(free))
         variance[free] = np.diag(np.linalg.pinv(S[np.ix_(free, free)], rcond=1e-12))
-        sigmas: Float64Array = np.sqrt(np.maximum(variance, 0.0) / _INDEPENDENT)
-        return sigmas
+        return np.sqrt(np.maximum(variance, 0.0) / _INDEPENDENT)
 
     def _reduced(
         self, damping: float
@@ -447,8 +441,7 @@ class _Problem:
         later = self.people[v].at(times + half)
         earlier = self.people[v].at(times - half)
         both = (later.seen & earlier.seen)[:, None, None]
-        speed: Float64Array = np.where(both, (later.rays - earlier.rays) / (2.0 * half), 0.0)
-        return speed
+        return np.where(both, (later.rays - earlier.rays) / (2.0 * half), 0.0)
 
     def result(self, now: _Unknowns, cost: float) -> Bundle:
         """Return cameras with their deviations."""

@@ -250,8 +250,7 @@ def _shared_times(
     spread.
     """
     both = first.seen & second.at(clock.own_times(first.times)).seen
-    times: Float64Array = first.times[spread(np.flatnonzero(both), most)]
-    return times
+    return first.times[spread(np.flatnonzero(both), most)]
 
 
 def _times_of_all(
@@ -265,8 +264,7 @@ def _times_of_all(
         left = replace(first, seen=first.seen & ~is_chosen)
         own = _shared_times(left, other, place, _ALL_FRAMES // len(others))
         is_chosen |= np.isin(first.times, own)
-    times: Float64Array = first.times[is_chosen]
-    return times
+    return first.times[is_chosen]
 
 
 def adjusted_first_place(matches: Sequence[Match | None]) -> CameraPlace:

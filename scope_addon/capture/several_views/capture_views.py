@@ -543,8 +543,7 @@ def _cuts_by_first_clock(first: _View, view: _View, match: Match | None) -> list
     times_s = match.place.first_times(own_s) * first.speed
     played_s = first.footage.timestamps
     within = (times_s >= played_s[0]) & (times_s <= played_s[-1])
-    cuts_s: list[float] = times_s[within].tolist()
-    return cuts_s
+    return times_s[within].tolist()
 
 
 def _about_footage(

@@ -240,8 +240,7 @@ def _bone_derivatives(body: Body, betas: Float64Array) -> Float64Array:
 
     def lengths(shape: Float64Array) -> Float64Array:
         J = body.rest_joints(shape)
-        of_bones: Float64Array = np.linalg.norm(J[starts] - J[ends], axis=1)
-        return of_bones
+        return np.linalg.norm(J[starts] - J[ends], axis=1)
 
     steps = STEP * np.eye(body.P)
     columns = [(lengths(betas + step) - lengths(betas - step)) / (2.0 * STEP) for step in steps]

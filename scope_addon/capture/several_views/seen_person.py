@@ -90,8 +90,7 @@ class Between:
     def least(self, confidence: FloatArray) -> Float64Array:
         """Return the lower confidence (n, ...) of both frames, of (T, ...); 0 where not seen."""
         least = np.minimum(confidence[self.before], confidence[self.after])
-        of_seen: Float64Array = least * self.seen.reshape(-1, *[1] * (least.ndim - 1))
-        return of_seen
+        return least * self.seen.reshape(-1, *[1] * (least.ndim - 1))
 
 
 @dataclass(frozen=True)

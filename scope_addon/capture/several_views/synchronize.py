@@ -186,8 +186,7 @@ def _onsets(loudness: Float32Array) -> Float64Array:
     change = loudness[_ONSET_STEPS:] - loudness[:-_ONSET_STEPS]
     rise[_ONSET_STEPS // 2 : len(rise) - (_ONSET_STEPS - _ONSET_STEPS // 2)] = np.maximum(change, 0)
     rise -= rise.mean(axis=0)
-    standardized: Float64Array = rise / np.maximum(rise.std(axis=0), 1e-6)
-    return standardized
+    return rise / np.maximum(rise.std(axis=0), 1e-6)
 
 
 def _correlation(

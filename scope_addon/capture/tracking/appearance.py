@@ -73,8 +73,7 @@ def sample(image_rgb: Uint8Array, points: FloatArray) -> Uint8Array:
     height, width = image_rgb.shape[:2]
     x, y = np.round(points).astype(int).T
     inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    pixels: Uint8Array = image_rgb[y[inside], x[inside]]
-    return pixels
+    return image_rgb[y[inside], x[inside]]
 
 
 def _histogram(pixels: Uint8Array) -> Float64Array:

@@ -350,5 +350,4 @@ def certainty(face: FloatArray, directions: Float64Array, ears: FloatArray) -> F
     """
     cosine = (ears * directions).sum(axis=1) / np.maximum(np.linalg.norm(ears, axis=1), 1e-9)
     agreed = np.clip((cosine - _CONTRADICTED) / (_AGREED - _CONTRADICTED), 0.0, 1.0)
-    out: Float64Array = agreed * parts(face)[0] * presence_of(face) ** 2
-    return out
+    return agreed * parts(face)[0] * presence_of(face) ** 2

@@ -96,8 +96,7 @@ class Sight:
     @property
     def wrist_px(self) -> Float64Array:
         """The body's wrist (2,)."""
-        wrist: Float64Array = self.person.keypoints_px[WRISTS[self.side]]
-        return wrist
+        return self.person.keypoints_px[WRISTS[self.side]]
 
     @property
     def wrist_confidence(self) -> float:

@@ -121,8 +121,7 @@ def scale_px_per_m(track: Track) -> Float64Array:
     reach = round(SPREAD_S / max(track.step_s, 1e-3)) if len(track) > 1 else 0
     padded = np.pad(size, reach, mode="edge")
     largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
-    scale: Float64Array = np.maximum(largest / SPREAD_M, 1e-3)
-    return scale
+    return np.maximum(largest / SPREAD_M, 1e-3)
 
 
 def _interpolated(

@@ -153,8 +153,7 @@ def _centred_body(estimate: PoseEstimate) -> FloatArray:
     """
     if estimate.world_landmarks.any():
         return estimate.world_landmarks
-    centred: FloatArray = estimate.keypoints_px - estimate.keypoints_px[LIMBS].mean(axis=0)
-    return centred
+    return estimate.keypoints_px - estimate.keypoints_px[LIMBS].mean(axis=0)
 
 
 def find_labels(
@@ -309,5 +308,4 @@ def _limb_distance(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def mean_distance(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the (...) mean distance of corresponding points a (..., n, m) and b (..., n, m)."""
-    distance: FloatArray = np.linalg.norm(a - b, axis=-1).mean(axis=-1)
-    return distance
+    return np.linalg.norm(a - b, axis=-1).mean(axis=-1)

@@ -123,10 +123,7 @@ def _features(track: Track, limbs: _Limbs) -> tuple[FloatArray, Float64Array]:
     """
 
     def from_anchor(points: FloatArray) -> FloatArray:
-        relative: FloatArray = points[:, limbs.joints] - points[:, limbs.anchors].mean(
-            axis=1, keepdims=True
-        )
-        return relative
+        return points[:, limbs.joints] - points[:, limbs.anchors].mean(axis=1, keepdims=True)
 
     dimensions = 3 if track.has_depth else 2
     in_image = from_anchor(track.keypoints_px) / scale_px_per_m(track)[:, None, None]
@@ -142,10 +139,7 @@ def _reference_cost(f: FloatArray, reference: Float64Array) -> FloatArray:
     residual = (
         np.linalg.norm(f[..., : reference.shape[-1]] - reference, axis=-1) / REFERENCE_SIGMA_M
     )
-    cost: FloatArray = (
-        np.where(np.isfinite(residual), np.minimum(residual, LIMIT), 0.0).mean(axis=-1).T
-    )
-    return cost
+    return np.where(np.isfinite(residual), np.minimum(residual, LIMIT), 0.0).mean(axis=-1).T
 
 
 def _continuity_cost(f: FloatArray, times: Float64Array, acquired: BoolArray) -> Float64Array:
@@ -187,5 +181,4 @@ def _cheapest(cost: Float64Array, label_cost: FloatArray) -> BoolArray:
     # (N−2, a, b, b', c)
     switching = np.where(np.eye(2, dtype=bool)[:, :, None], cost[2:, :, :, None], np.inf)
     path = least_cost_path(pairs.reshape(-1, 4), switching.reshape(-1, 4, 4))
-    labels: BoolArray = np.concatenate([path[:1] // 2, path % 2]).astype(bool)
-    return labels
+    return np.concatenate([path[:1] // 2, path % 2]).astype(bool)

@@ -189,8 +189,7 @@ class Tracklet:
 
 def trunk_px(keypoints_px: FloatArray) -> FloatArray:
     """Return the middle (2,) of the trunk, of keypoints (33, 2) in the image."""
-    center: FloatArray = keypoints_px[TRUNK].mean(axis=0)
-    return center
+    return keypoints_px[TRUNK].mean(axis=0)
 
 
 def make_track(

@@ -127,10 +127,7 @@ def _heights(
         poses = body.forward_kinematics(rotations, root - pelvis_at_rest, betas)
         return (skin.heights(*poses, T_floor_camera[2, :3]),)
 
-    above: Float64Array = (
-        by_blocks(heights, placed.rotations, placed.root)[0] + T_floor_camera[2, 3]
-    )
-    return above
+    return by_blocks(heights, placed.rotations, placed.root)[0] + T_floor_camera[2, 3]
 
 
 def _lifts(lowest: Float64Array, elsewhere: BoolArray, times: Float64Array) -> Float64Array:

@@ -87,10 +87,7 @@ def leg_support(body: Body, joints: FloatArray) -> FloatArray:
     straight = np.max(
         [(shank * thigh).sum(1) for shank, thigh in leg_directions(body, joints)], axis=0
     )
-    support: FloatArray = np.clip(
-        (straight - RESTING_KNEE_COS) / (CARRYING_KNEE_COS - RESTING_KNEE_COS), 0.0, 1.0
-    )
-    return support
+    return np.clip((straight - RESTING_KNEE_COS) / (CARRYING_KNEE_COS - RESTING_KNEE_COS), 0.0, 1.0)
 
 
 def leg_directions(body: Body, joints: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
@@ -109,8 +106,7 @@ def leg_directions(body: Body, joints: FloatArray) -> list[tuple[FloatArray, Flo
 def direction(body: Body, joints: FloatArray, a: str, b: str) -> FloatArray:
     """Return the (T, 3) unit vectors from joint a to joint b, given the joints (T, K+1, 3)."""
     d = joints[:, body.joint_names.index(b)] - joints[:, body.joint_names.index(a)]
-    unit: FloatArray = d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
-    return unit
+    return d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
 
 
 def balancing_rotations(
@@ -173,5 +169,4 @@ def _distance_from_middle(
     farthest = np.where(is_support, place, -np.inf).max(axis=1)
     x = (zero_moment_point * sight).sum(axis=1)
     m = np.where(is_support.any(axis=1), np.clip(x, nearest, farthest), x)
-    distance: FloatArray = x - m
-    return distance
+    return x - m

@@ -95,10 +95,7 @@ class CameraPath:
         """
         if self.is_static:
             return points
-        local: Float64Array = np.einsum(
-            "tji,tkj->tki", self.R_first_camera, points - self.center[:, None]
-        )
-        return local
+        return np.einsum("tji,tkj->tki", self.R_first_camera, points - self.center[:, None])
 
     def stance_to_frames(self, stance: Stance) -> Stance:
         """Transform a stance from the first frame's axes to each frame's camera; the argument for a

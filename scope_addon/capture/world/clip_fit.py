@@ -218,8 +218,7 @@ def joint_sigma(
     rate = 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else _MIN_HZ
     inflation = (max(rate, _MIN_HZ) / _RATE_HZ) ** _EXPONENT
     variance = np.maximum(np.stack([along, across], axis=-1), 0.0)
-    sigma: Float64Array = inflation * np.sqrt(variance) * [ALONG, ACROSS]
-    return sigma
+    return inflation * np.sqrt(variance) * [ALONG, ACROSS]
 
 
 # A bone is mirrored while it is deeper, if it gets so deep.

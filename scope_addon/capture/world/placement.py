@@ -66,8 +66,7 @@ class PlacedTrack:
         weight = contact.copy()
         weight[:, : len(SOLES)] += MIN_SOLE_WEIGHT
         share = weight / weight.sum(axis=1, keepdims=True)
-        center: FloatArray = (share[..., None] * self.contact_points).sum(axis=1)
-        return center
+        return (share[..., None] * self.contact_points).sum(axis=1)
 
     def contact(self, up: FloatArray) -> FloatArray:
         """Return the (T, 6) probability that each contact point rests on something, 0 for those

@@ -264,8 +264,7 @@ def scale_by_feet(placed: PlacedTrack, part: slice, up: FloatArray, path: Float6
 
     def slowest2(scale: float, v_sole: FloatArray) -> Float64Array:
         v = v_sole + scale * v_camera[:, None]
-        v2: Float64Array = np.where(is_low, (v**2).sum(axis=2), np.inf).min(axis=1)[valid]
-        return v2
+        return np.where(is_low, (v**2).sum(axis=2), np.inf).min(axis=1)[valid]
 
     def speed_cost(scale: float) -> float:
         cost = SPEED_WEIGHT * np.log(scale * unit_speed / LIKELY_SPEED_M_S) ** 2
@@ -330,8 +329,7 @@ def belt_travel(placed: PlacedTrack, up: FloatArray, belt_m_s: float) -> Float64
     """
     ahead = _facing(placed, up)[placed.valid].mean(axis=0)
     ahead = ahead / max(float(np.linalg.norm(ahead)), 1e-6)
-    travel: Float64Array = belt_m_s * np.cumsum(steps_in_scenes(placed.times))[:, None] * ahead
-    return travel
+    return belt_m_s * np.cumsum(steps_in_scenes(placed.times))[:, None] * ahead
 
 
 def contradicting_strides(placed: PlacedTrack, up: FloatArray) -> BoolArray:
@@ -358,8 +356,7 @@ def contradicting_strides(placed: PlacedTrack, up: FloatArray) -> BoolArray:
 def _ahead(placed: PlacedTrack, up: FloatArray) -> FloatArray:
     """Return (T,) how far the left foot is ahead of the right one, metres."""
     apart = placed.soles[:, :2].mean(axis=1) - placed.soles[:, 2:].mean(axis=1)
-    along: FloatArray = (apart * _facing(placed, up)).sum(axis=1)
-    return along
+    return (apart * _facing(placed, up)).sum(axis=1)
 
 
 def _step_times(placed: PlacedTrack, up: FloatArray, part: slice) -> Float64Array:
@@ -375,16 +372,14 @@ def _step_times(placed: PlacedTrack, up: FloatArray, part: slice) -> Float64Arra
     before = rows[changes]
     after = rows[changes + 1]
     share = along[before] / (along[before] - along[after])
-    overtaking: Float64Array = times[before] + share * (times[after] - times[before])
-    return overtaking
+    return times[before] + share * (times[after] - times[before])
 
 
 def _facing(placed: PlacedTrack, up: FloatArray) -> FloatArray:
     """Return the (T, 3) horizontal unit vectors in which the pelvis faces."""
     ahead = placed.rotations[:, 0, :, 2]
     level = ahead - (ahead @ up)[:, None] * up
-    facing: FloatArray = level / np.maximum(np.linalg.norm(level, axis=1, keepdims=True), 1e-6)
-    return facing
+    return level / np.maximum(np.linalg.norm(level, axis=1, keepdims=True), 1e-6)
 
 
 def _reached(along: FloatArray, times: Float64Array) -> BoolArray:
@@ -392,16 +387,13 @@ def _reached(along: FloatArray, times: Float64Array) -> BoolArray:
     reaching = times[along > MIN_STEP_M]
     after = np.searchsorted(reaching, times - ALTERNATION_S)
     before = np.searchsorted(reaching, times + ALTERNATION_S, side="right")
-    reached: BoolArray = before > after
-    return reached
+    return before > after
 
 
 def _mean_velocity(places: FloatArray, times: Float64Array) -> Float64Array:
     """Return the velocities (T, 3) of places, averaged over a stride."""
-    mean: Float64Array = gaussian_smooth(_velocity(places, times), times, MEAN_HZ)
-    return mean
+    return gaussian_smooth(_velocity(places, times), times, MEAN_HZ)
 
 
 def _velocity(values: FloatArray, times: Float64Array) -> Float64Array:
-    velocity: Float64Array = np.gradient(gaussian_smooth(values, times, CUTOFF_HZ), times, axis=0)
-    return velocity
+    return np.gradient(gaussian_smooth(values, times, CUTOFF_HZ), times, axis=0)

@@ -322,14 +322,12 @@ def _first_contact(contact: FloatArray, times: Float64Array) -> BoolArray:
     if len(times) < 2:
         return np.ones(len(times), np.bool_)
     on_ground_s = contact.max(axis=1) * np.gradient(times)
-    first: BoolArray = np.cumsum(on_ground_s) - on_ground_s < FIRST_S
-    return first
+    return np.cumsum(on_ground_s) - on_ground_s < FIRST_S
 
 
 def _lowest(soles_cam: FloatArray, up: FloatArray) -> FloatArray:
     """Return the (T, 3) lowest sole point of each frame."""
-    lowest: FloatArray = soles_cam[np.arange(len(soles_cam)), (soles_cam @ up).argmin(axis=1)]
-    return lowest
+    return soles_cam[np.arange(len(soles_cam)), (soles_cam @ up).argmin(axis=1)]
 
 
 def _unit(vector: FloatArray) -> Float64Array:

@@ -120,8 +120,7 @@ def cells(width: int, height: int) -> Float64Array:
             np.arange(height // side), np.arange(width // side), indexing="ij"
         )
         grids.append(np.stack([column, row, np.full(column.shape, side)], axis=-1).reshape(-1, 3))
-    table: Float64Array = np.concatenate(grids).astype(np.float64)
-    return table
+    return np.concatenate(grids).astype(np.float64)
 
 
 # YOLOv8, YOLO11 and similar: one output (1, 4 + classes, cells), a column per box: its centre x, y,

@@ -125,8 +125,7 @@ def _approximate(name: str, at: dict[str, Float64Array]) -> Float64Array:
     if "mouth" in name:
         neck = (at["left_shoulder"] + at["right_shoulder"]) / 2
         to_eye = (at[f"{side}_eye"] - at["nose"]) * np.array([1.0, 0.0])
-        mouth: Float64Array = at["nose"] + 0.2 * (neck - at["nose"]) + 0.3 * to_eye
-        return mouth
+        return at["nose"] + 0.2 * (neck - at["nose"]) + 0.3 * to_eye
     if "heel" in name or "foot" in name:
         lower_leg = at[f"{side}_ankle"] - at[f"{side}_knee"]
         return at[f"{side}_ankle"] + (0.12 if "heel" in name else 0.2) * lower_leg

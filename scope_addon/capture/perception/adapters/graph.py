@@ -100,8 +100,7 @@ class NetworkProcess:
         with self._lock:
             answer = self._ask({"input": name}, [array])
             self._limit_s = RUN_S  # the first run may still compile
-        outputs: list[Any] = answer["arrays"]
-        return outputs
+        return answer["arrays"]
 
     def _ask(self, request: dict[str, Any], arrays: list[Any] | None = None) -> dict[str, Any]:
         if not self._end.alive:
@@ -133,14 +132,12 @@ class NetworkProcess:
         if status == OUT_OF_MEMORY:
             return ModelFileError(
                 f"{self._path} was stopped because it took more than {self._limit_bytes / 1e9:.1f} "
-                "GB of memory; "
-                "choose a smaller network"
+                "GB of memory; choose a smaller network"
             )
         if elapsed_s >= self._limit_s:
             return ModelFileError(
                 f"{self._path} was stopped because it gave no result within {self._limit_s:g} s; "
-                "choose a faster "
-                "network, or export this one again"
+                "choose a faster network, or export this one again"
             )
         return RuntimeError(f"onnxruntime crashed in its process, which ended with status {status}")
 
