@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 
 from ..scope_addon.capture import repair as repair_module
 from ..scope_addon.capture import solve as solve_module
-from ..scope_addon.capture.clock import StageClock
 from ..scope_addon.capture.fitting import prepared_track
 from ..scope_addon.capture.fitting.frame_measurements import DEPTH_SIGMA_M, Measurer
 from ..scope_addon.capture.fitting.prepared_track import Stance
@@ -47,6 +46,7 @@ from ..scope_addon.capture.world import stance as stance_module
 from ..scope_addon.capture.world.assemble import Shot
 from ..scope_addon.capture.world.clip_window import ClipWindow
 from ..scope_addon.capture.world.placement import PlacedTrack
+from ..scope_addon.clock import StageClock
 from ..scope_addon.errors import NoPersonError
 from ..scope_addon.motion import Motion
 from ..solver import Body, load_body

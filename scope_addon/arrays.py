@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names for arrays in signatures, whose shapes and units stand beside them; and the rounding of
-what one stage of a capture hands to the next.
+"""Names for arrays in signatures, whose shapes and units stand beside them; unit vectors; and the
+rounding of what one stage of a capture hands to the next.
 
 The last bits of sums and products differ between versions of numpy and its libraries. Trackers and
 fits amplify them: without rounding, the same clip was captured up to 1.1 m differently with Python
@@ -36,3 +36,8 @@ def round_number(value: float, step: float) -> float:
 def round_array(values: FloatArray) -> FloatArray:
     """Return the multiples of `STEP` that are nearest to values."""
     return np.round(values / STEP) * STEP
+
+
+def unit_vectors(vectors: FloatArray) -> FloatArray:
+    """Return vectors (..., n) with length 1; one of length 0 stays 0."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..solver.names import BODY_JOINTS
-from .arrays import BoolArray, Float32Array, Float64Array
+from .arrays import BoolArray, Float32Array, Float64Array, unit_vectors
 from .motion import Motion
 
 # reprojection error above which a frame should be reviewed, as a share of the image's longer side
@@ -222,8 +222,7 @@ def _leaps(motion: Motion, pelvis: Float64Array) -> BoolArray:
     :param pelvis: (T, 3) in the world, metres.
     """
     times = motion.times_with_gaps
-    sight = pelvis - motion.world_from_camera[:, :3, 3]
-    sight /= np.maximum(np.linalg.norm(sight, axis=1, keepdims=True), 1e-9)
+    sight = unit_vectors(pelvis - motion.world_from_camera[:, :3, 3])
     steps = np.diff(pelvis, axis=0)
     across = steps - (steps * sight[1:]).sum(axis=1, keepdims=True) * sight[1:]
     speed = np.linalg.norm(across, axis=1) / np.diff(times)

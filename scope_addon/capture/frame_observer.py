@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Uint8Array
+from ..clock import StageClock
 from ..notices import Notice
 from ..scene_gaps import SCENE_GAP_S, cut_times, with_scene_gaps
 from .camera.background_record import BackgroundRecord
 from .camera.camera_rotation import BackgroundTracker
 from .camera.intrinsics import Camera
-from .clock import StageClock
 from .media.frame import AutoExposure, Frame
 from .media.video import Video
 from .perception.observation import Observation

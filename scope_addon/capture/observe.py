@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ...solver.rotations import log
 from ..arrays import Float64Array
+from ..clock import COMPILING, FINDING, Progress, StageClock
 from ..errors import NoPersonError
 from ..footage import display_text
 from ..machine_code.kernel_count import kernel_count
@@ -26,7 +27,6 @@ from .camera.given_path import GivenPath, read_camera_path
 from .camera.intrinsics import Camera, choose_camera
 from .camera.line_segments import Lines
 from .camera.zoom import Zoom
-from .clock import COMPILING, FINDING, Progress, StageClock
 from .fitting.focal_length import BackgroundEstimators, FocalFits
 from .fitting.live_body import LiveBody
 from .frame_observer import FrameObserver, Observed, Trackers

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from ...solver.body import Body
 from ..capture_report import Report
+from ..clock import Progress, StageClock
 from ..footage import display_text
 from ..motion import Motion
-from .clock import Progress, StageClock
 from .media.video import Video, open_video
 from .observe import Footage, ObserveFrames, Watch, observe
 from .options import CaptureOptions, check_options

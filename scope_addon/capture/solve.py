@@ -13,9 +13,9 @@ import numpy as np
 
 from ...solver.body_file import CHILD_BELOW_M
 from ..arrays import BoolArray, Float64Array
+from ..clock import Progress
 from ..kinematics.frame_blocks import to_single_precision
 from ..motion import Motion
-from .clock import Progress
 from .fitting.frame_sequence import FittedTrack
 from .fitting.prepared_track import PreparedTrack, prepare_track
 from .fitting.track_fit import fit_each_frame, fit_track, ground

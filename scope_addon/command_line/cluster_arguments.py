@@ -25,8 +25,8 @@ from .arguments import path_argument
 from .terminal import print_message
 
 if TYPE_CHECKING:
-    from ..capture.clock import Progress
     from ..capture.options import CaptureOptions
+    from ..clock import Progress
     from ..cluster.runner import DaskRunner
 
 WINDOW_SECONDS = "--window-seconds"

@@ -22,6 +22,7 @@ from typing import Any
 
 from ...solver.errors import InputError
 from ..atomic_write import complete_file, resolve_link
+from ..clock import Progress
 from ..errors import NO_PERSON, OutputError, UsageError
 from ..footage import FOOTAGE_SUFFIXES, display_text, is_url, json_text, unicode_text
 from ..temporary import hold, release, remove
@@ -124,7 +125,7 @@ class Batch:
         recursive: bool = False,
         views: bool = False,
         again: bool = False,
-        progress: Callable[[str, int, int], None] = lambda stage, done, total: None,
+        progress: Progress = lambda *_: None,
         say: Callable[[str], None] = lambda text: None,
         runner: Runner | None = None,
     ) -> dict[str, Any]:

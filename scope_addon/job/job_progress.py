@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..capture.clock import COMPILING, FINDING
+from ..clock import COMPILING, FINDING
 
 # Share of the total time that each stage of a capture takes, in order; measured on clips of 5 to 10
 # seconds.

@@ -13,11 +13,11 @@ import gc
 import numpy as np
 
 from ...solver.body_file import ASSETS
-from ..capture.clock import Progress
 from ..capture.fitting.rasterizer import fill_silhouette
 from ..capture.media.video_range import VideoRange
 from ..capture.options import CaptureOptions
 from ..capture.pipeline import capture
+from ..clock import Progress
 from ..edit.corrected_motion import with_corrections
 from ..edit.corrections import Pin
 from ..machine_code.code_cache import compiled_kernels

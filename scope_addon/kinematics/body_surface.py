@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
-from ..arrays import BoolArray, Float64Array, FloatArray, IndexArray
+from ..arrays import BoolArray, Float64Array, FloatArray, IndexArray, unit_vectors
 from .contact_points import PALMS, with_keypoints
 from .frame_blocks import by_blocks
 
@@ -131,7 +131,7 @@ class BodySurface:
             R_transposed = np.swapaxes(R[:, joint], 1, 2)
             v[:, rows] += local @ R_transposed + weights * t[:, joint, None]
             normals[:, rows] += normal @ R_transposed
-        return v, normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+        return v, unit_vectors(normals)
 
 
 def _skin(

@@ -20,7 +20,7 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.rotations import exp, shortest_turn
-from ..arrays import Float64Array, FloatArray
+from ..arrays import Float64Array, FloatArray, unit_vectors
 
 HINGE = 0.3  # Sine of the least angle at which a knee bends mainly in its own plane.
 # Share of the stretched leg's length. Beyond it a knee snaps, unless the leg is longer already.
@@ -99,8 +99,7 @@ def knee_turn(
     """
     a = np.linalg.norm(upper, axis=1)
     b = np.linalg.norm(lower, axis=1)
-    axis = cross(upper, lower) / (a * b)[:, None] + HINGE * sideways
-    axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)
+    axis = unit_vectors(cross(upper, lower) / (a * b)[:, None] + HINGE * sideways)
     along_u = (upper * axis).sum(1)
     along_l = (lower * axis).sum(1)
     fixed = along_u * along_l

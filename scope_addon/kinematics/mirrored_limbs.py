@@ -14,9 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...solver.rotations import shortest_turn
-from ..arrays import Float64Array, FloatArray, IndexArray
+from ..arrays import Float64Array, FloatArray, IndexArray, unit_vectors
 from .sequences import runs
-from .standing import line_of_sight
 
 LIMBS = (
     ("left_shoulder", "left_elbow", "left_wrist"),
@@ -44,7 +43,7 @@ def bone_depths(
     :param ends: (T, 3) the next one.
     :param center: (T, 3) the camera.
     """
-    return ((ends - starts) * line_of_sight(ends - center)).sum(axis=1)
+    return ((ends - starts) * unit_vectors(ends - center)).sum(axis=1)
 
 
 def runs_of_one_sign(depths: FloatArray, shallow: float, deep: float) -> list[slice]:
@@ -96,6 +95,6 @@ def _mirrored(
     center: FloatArray,
 ) -> FloatArray:
     bone = ends - starts
-    sight = line_of_sight(ends - center)
+    sight = unit_vectors(ends - center)
     other = bone - 2.0 * (bone * sight).sum(axis=1, keepdims=True) * sight
     return shortest_turn(bone, other) @ R

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...solver.rotations import exp, log, matrix_from_quaternion, quaternion_from_matrix
-from ..arrays import BoolArray, Float64Array, FloatArray
+from ..arrays import BoolArray, Float64Array, FloatArray, unit_vectors
 
 # Human limb motion lies below about 6 Hz; detector noise is white. A Gaussian has a slow roll-off:
 # at 4.5 Hz it passes as much noise as the 6 Hz Butterworth filter that is usual for marker data.
@@ -80,7 +80,7 @@ def fill_rotation_gaps(R: FloatArray, valid: BoolArray, times: Float64Array) -> 
     out = np.empty_like(R)
     for joints in _joint_blocks(R):
         q = fill_gaps(continuous_quaternions(R[last_valid, joints]), valid, times)
-        out[:, joints] = matrix_from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
+        out[:, joints] = matrix_from_quaternion(unit_vectors(q))
     return out
 
 
@@ -162,7 +162,7 @@ def smooth_rotations(
     out = np.empty_like(R) if out is None else out
     for joints in _joint_blocks(R):
         q = gaussian_smooth(continuous_quaternions(R[:, joints]), times, cutoff_hz)
-        out[:, joints] = matrix_from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
+        out[:, joints] = matrix_from_quaternion(unit_vectors(q))
     return out
 
 
@@ -181,5 +181,6 @@ def smooth_root(
     """
     distance = np.maximum(np.linalg.norm(t_camera_root, axis=1, keepdims=True), 1e-6)
     ray = gaussian_smooth(t_camera_root / distance, times, ROTATION_CUTOFF_HZ / strength)
-    ray /= np.maximum(np.linalg.norm(ray, axis=1, keepdims=True), 1e-6)
-    return ray * np.exp(gaussian_smooth(np.log(distance), times, DEPTH_CUTOFF_HZ / strength))
+    return unit_vectors(ray) * np.exp(
+        gaussian_smooth(np.log(distance), times, DEPTH_CUTOFF_HZ / strength)
+    )

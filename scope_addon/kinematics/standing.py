@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Float64Array, FloatArray
+from ..arrays import Float64Array, FloatArray, unit_vectors
 from .contact_points import SOLES
 from .smoothing import gaussian_smooth
 
@@ -29,13 +29,6 @@ STILL_CUTOFF_HZ = 0.6
 WRONG_DEPTH_M = 0.4  # d
 UNEVEN_M = 0.6  # h_u: one foot may rest this much higher than the other on stairs or boxes.
 LEVEL_M = 0.25  # h_l: feet that stand farther above or below stand on something else.
-
-
-def line_of_sight(position: FloatArray) -> FloatArray:
-    """Return the (..., 3) unit vectors from the camera's centre to positions (..., 3) relative to
-    it.
-    """
-    return position / np.maximum(np.linalg.norm(position, axis=-1, keepdims=True), 1e-9)
 
 
 def standing_probability(
@@ -67,7 +60,7 @@ def standing_probability(
     speed = np.linalg.norm(velocity, axis=-1)
     allowed = np.full(height.shape, UNEVEN_M if uneven_ground else CONTACT_HEIGHT_M)
     if len(times) > 2 and center is not None:
-        upwards = np.abs(line_of_sight(soles - np.expand_dims(center, -2)) @ up)
+        upwards = np.abs(unit_vectors(soles - np.expand_dims(center, -2)) @ up)
         mean_speed = np.sqrt(gaussian_smooth(np.square(speed), times, STILL_CUTOFF_HZ))
         allowed += WRONG_DEPTH_M * upwards * logistic(4 * (1 - mean_speed / STILL_M_S))
     p: FloatArray = logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * logistic(
@@ -138,7 +131,7 @@ def velocity_across(
         gaussian_smooth(points, times, CONTACT_CUTOFF_HZ), times, axis=0
     )
     if center is not None:
-        sight = line_of_sight(points - np.expand_dims(center, -2))
+        sight = unit_vectors(points - np.expand_dims(center, -2))
         velocity = velocity - sight * (velocity * sight).sum(-1, keepdims=True)
     return velocity
 

@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver import Body
-from ...solver.rotations import exp, log
 from ..arrays import Float64Array, FloatArray, IndexArray
 from ..capture.camera.intrinsics import Camera
 from ..capture.camera.line_segments import Lines
@@ -36,6 +35,7 @@ from ..capture.world.camera_path import CameraPath
 from ..capture.world.placement import MAX_STEP_S, RawMotion, place_track
 from ..errors import NoPersonError, OutputError, UsageError
 from ..kinematics.contact_points import SOLES, contact_point_positions, with_contact_points
+from ..kinematics.smoothing import interpolate_rotations
 from ..motion import Motion
 from ..temporary import is_held, remove
 from ..untrusted.body_file import load_body
@@ -243,11 +243,10 @@ def _between(poses: Sequence[LivePose], k: int, after: int, since: Float64Array)
     before = earlier.rotations.copy()
     before[0] = R.T @ R_earlier @ before[0]
     root_before = (R_earlier @ earlier.root_cam + t_earlier - t) @ R
-    turn = log(np.swapaxes(before, 1, 2) @ later.rotations)
     return replace(
         poses[k],
         betas=later.betas,
-        rotations=before @ exp(share * turn),
+        rotations=interpolate_rotations(before, later.rotations, share),
         root_cam=root_before + share * (later.root_cam - root_before),
         T_world_camera=later.T_world_camera,
         joints=earlier.joints + share * (later.joints - earlier.joints),

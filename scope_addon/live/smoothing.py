@@ -21,8 +21,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...solver import rotations
+from ...solver.rotations import exp, log, nearest_rotation
 from ..arrays import Float64Array, FloatArray
+from ..kinematics.smoothing import interpolate_rotations
 
 DELAY_S = 0.06  # of every pose, whatever the frame rate: later frames separate noise from motion
 LONGEST_STEP_S = 0.5  # after a longer pause, a filter starts again
@@ -39,9 +40,9 @@ class Response:
     lead_s: float = 0.0
 
     @classmethod
-    def delayed(cls, stages: int, cutoff_hz: float, delay_s: float) -> Response:
-        """Return the response that delays steady motion by a time."""
-        return cls(stages, cutoff_hz, stages / (2 * np.pi * cutoff_hz) - delay_s)
+    def delayed(cls, stages: int, cutoff_hz: float) -> Response:
+        """Return the response that delays steady motion by `DELAY_S`."""
+        return cls(stages, cutoff_hz, stages / (2 * np.pi * cutoff_hz) - DELAY_S)
 
     def lead(self, age_s: float) -> float:
         """Return the lead at a time after the start."""
@@ -53,9 +54,9 @@ class Response:
         return float(1.0 / (1.0 + 1.0 / (2 * np.pi * self.cutoff_hz * step_s)))
 
 
-MOTION = Response.delayed(stages=6, cutoff_hz=5.5, delay_s=DELAY_S)
+MOTION = Response.delayed(stages=6, cutoff_hz=5.5)
 # its logarithm: noisier than the direction
-DISTANCE = Response.delayed(stages=5, cutoff_hz=3.5, delay_s=DELAY_S)
+DISTANCE = Response.delayed(stages=5, cutoff_hz=3.5)
 
 
 class VectorFilter:
@@ -100,11 +101,11 @@ class RotationFilter(VectorFilter):
     """Filters rotations (J, 3, 3), each for itself."""
 
     def _between(self, a: Float64Array, b: Float64Array, share: float) -> Float64Array:
-        between = a @ rotations.exp(share * rotations.log(np.swapaxes(a, 1, 2) @ b))
-        return rotations.nearest_rotation(between)  # without what rounding has added up
+        # without what rounding has added up
+        return nearest_rotation(interpolate_rotations(a, b, share))
 
     def _beyond(self, a: Float64Array, b: Float64Array, lead: float) -> Float64Array:
-        return b @ rotations.exp(lead * rotations.log(np.swapaxes(a, 1, 2) @ b))
+        return b @ exp(lead * log(np.swapaxes(a, 1, 2) @ b))
 
 
 class PoseFilter:

@@ -14,7 +14,7 @@ from typing import Any
 import bpy
 import scope
 from scope.scope_addon import ui
-from scope.scope_addon.capture.clock import PLACING
+from scope.scope_addon.clock import PLACING
 from scope.scope_addon.job.job_progress import BUILDING, FIRST_ONLY, STAGES
 from scope.scope_addon.notices import PARTS, PHRASES, SENTENCES
 from scope.scope_addon.ui.pin_tool import HANDLES

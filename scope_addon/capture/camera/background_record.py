@@ -22,7 +22,7 @@ import numpy as np
 
 from ....solver.rotations import exp, log
 from ...arrays import BoolArray, Float64Array
-from ...kinematics.smoothing import fill_rotation_gaps
+from ...kinematics.smoothing import fill_rotation_gaps, interpolate_rotations
 from .corner_tracks import SAMPLES_HZ, CornerTracks, corners_at_rest, joined_corners
 from .heading_drift import FrameEdges, remove_heading_drift
 from .intrinsics import Camera
@@ -247,8 +247,8 @@ def _faded(
     out = R.copy()
     rows = np.flatnonzero(known[-n:] & known_after)
     before = R[len(R) - n + rows]
-    share = (rows[:, None] + 1) / (n + 1)
-    out[len(R) - n + rows] = before @ exp(share * log(np.swapaxes(before, 1, 2) @ R_after[rows]))
+    share = (rows + 1) / (n + 1)
+    out[len(R) - n + rows] = interpolate_rotations(before, R_after[rows], share)
     return out
 
 

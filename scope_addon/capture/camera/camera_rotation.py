@@ -27,7 +27,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray, Uint8Array
+from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray, Uint8Array, unit_vectors
 from ..perception.region import inside, surroundings
 from .background_record import REVEALING_S, BackgroundRecord, best_rotation, is_rotated
 from .bars import find_bars
@@ -214,8 +214,7 @@ class BackgroundTracker:
         """Return the (n, 3) unit directions, in camera axes, of points (n, 2) in the working
         image.
         """
-        rays = self._camera.rays(self._to_full(points))
-        return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        return unit_vectors(self._camera.rays(self._to_full(points)))
 
     def _to_full(self, points: Float32Array) -> Float32Array:
         """Return points (n, 2) of the working image in the full one; OpenCV scales areas, not

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ...arrays import BoolArray, Float32Array, Float64Array, IndexArray, Uint8Array
+from ...arrays import BoolArray, Float32Array, Float64Array, IndexArray, Uint8Array, unit_vectors
 from ..perception.region import inside
 from .intrinsics import Camera
 
@@ -66,13 +66,12 @@ def corners_at_rest(
     :param R_first_camera: (T, 3, 3).
     :param tolerance: radians between a corner and its mean direction.
     """
-    rays = camera.rays(corners.points_px.astype(float))
-    rays /= np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), 1e-9)
+    rays = unit_vectors(camera.rays(corners.points_px.astype(float)))
     seen = np.einsum("nij,nj->ni", R_first_camera[corners.rows], rays)
     count = np.bincount(corners.numbers, minlength=corners.count)
     total = np.zeros((corners.count, 3))
     np.add.at(total, corners.numbers, seen)
-    mean = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-9)
+    mean = unit_vectors(total)
     off = np.zeros(corners.count)
     np.maximum.at(off, corners.numbers, np.linalg.norm(seen - mean[corners.numbers], axis=1))
     is_known = count >= MIN_SIGHTINGS

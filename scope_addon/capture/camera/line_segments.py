@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import BoolArray, Float64Array, FloatArray, Uint8Array
+from ...arrays import BoolArray, Float64Array, FloatArray, Uint8Array, unit_vectors
 from ..perception.region import inside, surroundings
 from .intrinsics import Camera
 
@@ -45,9 +45,7 @@ class Lines:
 
         A ray (x, y, 1) becomes (x / s, y / s, 1), so a plane's normal becomes (s n_x, s n_y, n_z).
         """
-        normals = self.normals * [scale, scale, 1.0]
-        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        return Lines(normals / np.maximum(lengths, 1e-12), self.lengths)
+        return Lines(unit_vectors(self.normals * [scale, scale, 1.0]), self.lengths)
 
 
 @dataclass(frozen=True)
@@ -84,8 +82,7 @@ def plane_normals(rays: FloatArray) -> NDArray[Any]:
 
     :param rays: (N, 2, 3) directions to the ends of each edge.
     """
-    normals = np.cross(rays[:, 0], rays[:, 1])
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return unit_vectors(np.cross(rays[:, 0], rays[:, 1]))
 
 
 def find_segments(

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float32Array, Float64Array
+from ...arrays import Float32Array, Float64Array, unit_vectors
 from .line_segments import Lines, Segments, plane_normals
 
 MAX_TILT = np.radians(25.0)  # between the picture's vertical and the direction of vertical edges
@@ -53,8 +53,7 @@ class Edges:
     def of(cls, segments: Segments, width: int, height: int) -> Edges:
         """Select the longest segments of a picture of this size in pixels."""
         ends = (segments.ends_px[:MAX_EDGES] - [width / 2, height / 2]).astype(np.float32)
-        along = ends[:, 1] - ends[:, 0]
-        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        along = unit_vectors(ends[:, 1] - ends[:, 0])
         return cls(ends, ends.mean(axis=1), along, segments.lengths[:MAX_EDGES].astype(np.float32))
 
     def axes(self, focal_px: float) -> tuple[float, Float64Array]:

@@ -22,8 +22,12 @@ import cv2
 import numpy as np
 
 from ....solver.rotations import exp, log, nearest_rotation
-from ...arrays import BoolArray, Float64Array, IndexArray
-from ...kinematics.smoothing import interpolated_places, interpolated_rotations
+from ...arrays import BoolArray, Float64Array, IndexArray, unit_vectors
+from ...kinematics.smoothing import (
+    interpolate_rotations,
+    interpolated_places,
+    interpolated_rotations,
+)
 from .bundle_adjustment import (
     Bundle,
     adjust,
@@ -302,7 +306,7 @@ class _Tracker:
         numbers = self._seen.numbers[k]
         new = np.isnan(self._first_ray[numbers, 0])
         rays = homogeneous(self._seen.rays[k][new]) @ R
-        self._first_ray[numbers[new]] = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        self._first_ray[numbers[new]] = unit_vectors(rays)
         self._first_center[numbers[new]] = -R.T @ t
 
     def _triangulate(self, k: int, R: Float64Array, t: Float64Array) -> None:
@@ -314,8 +318,7 @@ class _Tracker:
         open_ &= ~self._is_outlier[numbers]
         numbers = numbers[open_]
         a = self._first_ray[numbers]
-        b = homogeneous(self._seen.rays[k][open_]) @ R
-        b /= np.linalg.norm(b, axis=1, keepdims=True)
+        b = unit_vectors(homogeneous(self._seen.rays[k][open_]) @ R)
         center = -R.T @ t
         baseline = center - self._first_center[numbers]
         cosine = (a * b).sum(axis=1)
@@ -485,9 +488,9 @@ def _continued(before: _Part, after: _Part) -> _Part | None:
     moved = center.mean(axis=0) - scale * center_after[:common].mean(axis=0)
     R = after.R @ G.T
     centers = scale * center_after + moved
-    share = np.arange(1, common + 1)[:, None] / (common + 1)
-    R[:common] = kept @ exp(share * log(np.swapaxes(kept, 1, 2) @ R[:common]))
-    centers[:common] = center + share * (centers[:common] - center)
+    share = np.arange(1, common + 1) / (common + 1)
+    R[:common] = interpolate_rotations(kept, R[:common], share)
+    centers[:common] = center + share[:, None] * (centers[:common] - center)
     return _Part(
         before.first,
         np.concatenate([before.R[:-common], R]),

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....solver.rotations import exp
-from ...arrays import Float64Array
+from ...arrays import Float64Array, unit_vectors
 from .line_segments import Lines
 from .manhattan import PLANE_SIGMA, line_normal_equations
 
@@ -109,7 +109,7 @@ def _grid(up: Float64Array) -> Float64Array:
     across = np.linalg.svd(up[None])[2][1:]
     steps = np.tan(np.arange(-MAX_LEAN, MAX_LEAN + 1e-9, GRID_STEP))
     v = up + (steps[:, None, None] * across[0] + steps[:, None] * across[1]).reshape(-1, 3)
-    v /= np.linalg.norm(v, axis=1, keepdims=True)
+    v = unit_vectors(v)
     return v[v @ up > np.cos(MAX_LEAN)]
 
 

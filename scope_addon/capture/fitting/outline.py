@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ....solver import Body, ClipFit, Fit, fit_clip
 from ....solver.residuals.outline import FLOATS, INTS, pack
-from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
+from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray, unit_vectors
 from ...kinematics.body_surface import one_per_cell
 from ...kinematics.contact_points import with_keypoints
 from ..camera.intrinsics import Camera
@@ -115,7 +115,7 @@ class OutlineMeasurer:
         rows = np.flatnonzero(near)
         at = _crop(camera, mask.region, points[rows])
         ahead = _crop(camera, mask.region, points[rows] + 0.01 * normals[rows]) - at
-        normal = ahead / np.maximum(np.linalg.norm(ahead, axis=1), 1e-9)[:, None]
+        normal = unit_vectors(ahead)
         beside = np.rint(at + BESIDE_PX * normal).astype(int)
         inside = ((beside >= 0) & (beside < SIZE)).all(axis=1)
         covered = self._coverage(camera, skin, mask.region)
@@ -139,7 +139,7 @@ class OutlineMeasurer:
             return _NOTHING
         m = camera.rays(m_px)[:, :2]
         n = camera.rays(mask.region.image_from_crop((contour + outward + 0.5) / SIZE))[:, :2] - m
-        n /= np.linalg.norm(n, axis=1)[:, None]
+        n = unit_vectors(n)
         depth = points[rows, 2]
         sigmas = (OUTSIDE_SIGMA_M / depth) ** 2, (self._width[rows] / depth) ** 2
         weights = np.full(len(rows), OUTSIDE_WEIGHT), np.full(len(rows), INSIDE_WEIGHT)
@@ -198,8 +198,7 @@ def _crossings(
     slope = [cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((1, 0), (0, 1))]
     spots = place.astype(np.float32)[:, None]
     down = [-cv2.remap(image, spots, _NO_MAP, cv2.INTER_LINEAR)[:, 0] for image in slope]
-    outward = np.stack(down, axis=1).astype(float)
-    outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-9)[:, None]
+    outward = unit_vectors(np.stack(down, axis=1).astype(float))
     agree = (outward * normal[rows]).sum(axis=1) > AGREEMENT_COS
     return rows[agree], place[agree], outward[agree]
 

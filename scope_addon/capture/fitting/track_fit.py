@@ -12,13 +12,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from ....solver import ClipFit, Fit, State, fit_clip
 from ...arrays import FloatArray, round_array
+from ...clock import Progress
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
 from .outline import fit_shape_to_outline, spread, usable_masks
 from .prepared_track import PreparedTrack, Stance
@@ -29,7 +29,7 @@ SHAPE_FRAMES = 64  # from which the shape is estimated; more frames add little
 PROGRESS_FRAMES = 16  # between two reports
 
 
-def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]) -> FittedTrack:
+def fit_track(prepared: PreparedTrack, progress: Progress) -> FittedTrack:
     """Fit the body to a track that was seen in at least one frame.
 
     :param progress: called with the stage's name, the frames done and the total; 0: unknown.
@@ -84,9 +84,7 @@ def ground(
     return prepared.with_stance(stance, betas), start
 
 
-def fit_each_frame(
-    prepared: PreparedTrack, start: FittedTrack, progress: Callable[[str, int, int], None]
-) -> FittedTrack:
+def fit_each_frame(prepared: PreparedTrack, start: FittedTrack, progress: Progress) -> FittedTrack:
     """Fit every frame alone, from its state in another motion."""
     frames = FrameSequence(replace(prepared, weights=clip_weights(prepared.weights)), start.betas)
     T = len(start.valid)

@@ -22,8 +22,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...clock import FINDING, Progress, StageClock
 from ...errors import UsageError
-from ..clock import FINDING, Progress, StageClock
 from ..frame_observer import FrameObserver, Observed, Trackers, Window
 from ..media.frame import Frame
 from ..media.video import Video, no_frames_error, open_video, opencv_in_one_thread

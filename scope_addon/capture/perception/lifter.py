@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.errors import ModelFileError
-from ...arrays import BoolArray, Float32Array, FloatArray, IndexArray, round_array
+from ...arrays import BoolArray, Float32Array, FloatArray, IndexArray, round_array, unit_vectors
 from ...errors import SetupError
 from ...kinematics.frame_blocks import by_blocks
 from .landmark_network import HIPS, KEYPOINT_COUNT, TRUNK
@@ -84,10 +84,8 @@ def camera_towards(center: FloatArray) -> FloatArray:
     """Calculate the rotations (T, 3, 3) that bring rays (T, 2), in normalized image coordinates,
     onto the z axis.
     """
-    z = np.concatenate([center, np.ones_like(center[:, :1])], axis=1)
-    z /= np.linalg.norm(z, axis=1, keepdims=True)
-    x = np.stack([z[:, 2], np.zeros_like(z[:, 0]), -z[:, 0]], axis=1)
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    z = unit_vectors(np.concatenate([center, np.ones_like(center[:, :1])], axis=1))
+    x = unit_vectors(np.stack([z[:, 2], np.zeros_like(z[:, 0]), -z[:, 0]], axis=1))
     return np.stack([x, np.cross(z, x), z], axis=1)
 
 

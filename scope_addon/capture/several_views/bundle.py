@@ -30,7 +30,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ....solver.rotations import exp
-from ...arrays import BoolArray, Float64Array
+from ...arrays import BoolArray, Float64Array, unit_vectors
 from ..camera.bundle_adjustment import (
     damped_steps,
     pose_jacobian,
@@ -185,7 +185,7 @@ def triangulate(
         line = np.concatenate(
             [ray / np.exp(camera.log_focal), np.ones((*ray.shape[:-1], 1))], axis=-1
         )
-        line = line / np.linalg.norm(line, axis=-1, keepdims=True) @ camera.R_camera_first
+        line = unit_vectors(line) @ camera.R_camera_first
         across = np.eye(3) - line[..., :, None] * line[..., None, :]
         across = across * weight[..., None, None]
         A += across

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...arrays import Float32Array, Float64Array
+from ...clock import FINDING, PLACING, Progress, StageClock
 from ...errors import UsageError
 from ...footage import display_text
 from ...notices import Notice, notice
 from ...options.capture import ALL
 from ..camera.calibration import Calibration, placed_cameras, read_calibration
 from ..camera.intrinsics import Camera
-from ..clock import FINDING, PLACING, Progress, StageClock
 from ..fitting.keypoint_offsets import with_keypoint_offsets
 from ..fitting.prepared_track import prepare_track
 from ..media.sound import loudness

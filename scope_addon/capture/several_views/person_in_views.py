@@ -14,9 +14,9 @@ import numpy as np
 
 from ....solver import Body, MotionFit, MotionPrior, State, fit_motion
 from ...arrays import Float64Array, IndexArray
+from ...clock import Progress
 from ...kinematics.frame_blocks import to_single_precision
 from ..camera.intrinsics import Camera
-from ..clock import Progress
 from ..fitting.frame_measurements import Measurer
 from ..fitting.frame_sequence import FittedTrack, with_hands
 from ..fitting.hand_measurements import HandMeasurer

@@ -40,7 +40,7 @@ from numpy.typing import NDArray
 
 from ....solver.errors import ModelFileError
 from ....solver.rotations import exp, log
-from ...arrays import BoolArray, Float64Array, FloatArray
+from ...arrays import BoolArray, Float64Array, FloatArray, unit_vectors
 from ...scene_gaps import steps_in_scenes
 from ...untrusted.files import read_npz
 from ..camera.intrinsics import Camera
@@ -237,8 +237,7 @@ def _directions(tangents: Float64Array) -> Float64Array:
     and up.
     """
     ahead = np.concatenate([tangents, np.ones((len(tangents), 1))], axis=1)
-    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
-    return np.repeat(ahead[:, None], 2, axis=1)
+    return np.repeat(unit_vectors(ahead)[:, None], 2, axis=1)
 
 
 def with_expressions(rows: FloatArray, times: Float64Array) -> FloatArray:

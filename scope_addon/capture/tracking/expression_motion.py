@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import BoolArray, Float64Array, FloatArray
+from ...arrays import BoolArray, Float64Array, FloatArray, unit_vectors
 from ...kinematics.face import EXPRESSIONS
 from ...kinematics.smoothing import gaussian_smooth
 from ...motion import FACE_KEYS
@@ -62,12 +62,11 @@ def expression_motion(
         gaze[:, k] = released(directions[:, k], open_eyes[:, k], times, _FORWARD)
         if smoothing and len(rows) > 2:
             gaze[:, k] = calmed(gaze[:, k], times, np.array(GAZE_NOISE))
-    gaze /= np.linalg.norm(gaze, axis=-1, keepdims=True)
     values = (
         weights.astype(np.float32),
         np.array(EXPRESSIONS),
         sure.astype(np.float32),
-        gaze.astype(np.float32),
+        unit_vectors(gaze).astype(np.float32),
         contours.astype(np.float32),
         np.array(CONTOURS, np.int64),
     )

@@ -28,10 +28,9 @@ import numpy as np
 
 from ....solver.body import Body
 from ....solver.rotations import exp
-from ...arrays import BoolArray, FloatArray
+from ...arrays import BoolArray, FloatArray, unit_vectors
 from ...kinematics.contact_points import SOLES
 from ...kinematics.smoothing import gaussian_smooth
-from ...kinematics.standing import line_of_sight
 from .placement import PlacedTrack
 
 # The speed of the centre of mass at which the weight of the correction has fallen to 1/e.
@@ -105,8 +104,8 @@ def leg_directions(body: Body, joints: FloatArray) -> list[tuple[FloatArray, Flo
 
 def direction(body: Body, joints: FloatArray, a: str, b: str) -> FloatArray:
     """Return the (T, 3) unit vectors from joint a to joint b, given the joints (T, K+1, 3)."""
-    d = joints[:, body.joint_names.index(b)] - joints[:, body.joint_names.index(a)]
-    return d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
+    at = body.joint_names.index
+    return unit_vectors(joints[:, at(b)] - joints[:, at(a)])
 
 
 def balancing_rotations(
@@ -123,7 +122,7 @@ def balancing_rotations(
     mass = gaussian_smooth(center_of_mass(placed.body, placed.joints), times, CUTOFF_HZ)
     pivot = placed.contact_center(contact)
     from_camera = mass - placed.center
-    sight = line_of_sight(from_camera - (from_camera @ up)[:, None] * up)  # along the floor
+    sight = unit_vectors(from_camera - (from_camera @ up)[:, None] * up)  # along the floor
     height = np.maximum((mass - pivot) @ up, MIN_HEIGHT_M)
     in_contact = contact > 0.5
     certainty = in_contact.any(axis=1) * leg_support(placed.body, placed.joints)

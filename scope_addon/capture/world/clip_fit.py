@@ -21,7 +21,7 @@ frames around are fitted together from both poses, and the cheaper one is kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -29,10 +29,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver import Body, MotionFit, MotionPrior, State
-from ....solver.rotations import exp, log
-from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
+from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray, unit_vectors
+from ...clock import Progress
 from ...kinematics.body_surface import BodySurface
 from ...kinematics.mirrored_limbs import LIMBS, bone_depths, mirrored_limb, runs_of_one_sign
+from ...kinematics.smoothing import interpolate_rotations
 from ..fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
 from ..fitting.prepared_track import PreparedTrack
 from ..fitting.weights import motion_priors
@@ -44,7 +45,6 @@ WINDOW_UNKNOWNS = 36_000
 # The unknowns that two windows share: they differ by 2 to 4 mm where one has 1 s more to its end.
 OVERLAP = 4_800
 LONGEST_STEP = 2.5  # between two frames that are fitted together, in units of the median step
-_Progress = Callable[[str, int, int], None]
 # Factors of the standard deviations, see `joint_sigma`.
 ALONG = 15.5
 ACROSS = 11.5
@@ -55,7 +55,7 @@ _MIN_HZ = 10.0  # acceleration hardly couples frames that are further apart
 
 
 def fit_clip(
-    prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress
+    prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: Progress
 ) -> FittedTrack:
     """Fit all frames of a track together, between longer gaps.
 
@@ -77,7 +77,7 @@ class _Clip:
     """A track on its way to its motion, in the first frame's axes."""
 
     def __init__(
-        self, prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress
+        self, prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: Progress
     ) -> None:
         self._prepared = prepared
         self._path = path
@@ -131,8 +131,7 @@ class _Clip:
         both = int(self._done[frames].sum())
         share = (np.arange(both) + 1.0) / (both + 1.0)
         earlier = self._rotations[frames[:both]].astype(float)
-        turn = log(np.swapaxes(earlier, -1, -2) @ rotations[:both])
-        rotations[:both] = earlier @ exp(share[:, None, None] * turn)
+        rotations[:both] = interpolate_rotations(earlier, rotations[:both], share[:, None])
         root[:both] = (
             self._root[frames[:both]] * (1 - share[:, None]) + root[:both] * share[:, None]
         )
@@ -212,7 +211,7 @@ def joint_sigma(
     """
     covariance = from_pelvis.copy()
     covariance[:, 0] = pelvis
-    sight = joints / np.linalg.norm(joints, axis=-1, keepdims=True)
+    sight = unit_vectors(joints)
     along = np.einsum("tki,tkij,tkj->tk", sight, covariance, sight)
     across = 0.5 * (np.trace(covariance, axis1=-2, axis2=-1) - along)
     rate = 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else _MIN_HZ

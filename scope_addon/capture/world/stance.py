@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import Float64Array, FloatArray
-from ...kinematics.standing import LEVEL_M, line_of_sight, logistic
+from ...arrays import Float64Array, FloatArray, unit_vectors
+from ...kinematics.standing import LEVEL_M, logistic
 from ..fitting.prepared_track import Stance
 from .balance import balancing_rotations
 from .placement import PlacedTrack
@@ -45,7 +45,7 @@ def stance_on_ground(placed: PlacedTrack, T_floor_camera: Float64Array) -> Stanc
         placed.times,
         one_floor,
     )
-    shift = shift_m[:, None] * line_of_sight(root - placed.center)
+    shift = shift_m[:, None] * unit_vectors(root - placed.center)
     turn, pivot = balancing_rotations(placed, contact, up)
     root = pivot + np.einsum("tij,tj->ti", turn, root - pivot)
     height = (placed.contact_points + shift[:, None]) @ up + T_floor_camera[2, 3]
@@ -82,7 +82,7 @@ def correct_depth(
     T = len(times)
     R = T_world_camera[:3, :3]
     height0 = T_world_camera[2, 3]
-    ray_world = line_of_sight(root_cam) @ R.T
+    ray_world = unit_vectors(root_cam) @ R.T
     points_world = points_cam @ R.T
     height = points_world[..., 2] + height0
     # A foot that is probably in the air says nothing about the floor.

@@ -27,10 +27,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import BoolArray, Float64Array, FloatArray
+from ...arrays import BoolArray, Float64Array, FloatArray, unit_vectors
 from ...kinematics.sequences import runs
 from ...kinematics.smoothing import gaussian_smooth
-from ...kinematics.standing import line_of_sight
 from ...scene_gaps import steps_in_scenes
 from ..camera.odometry import Odometry
 from .placement import PlacedTrack
@@ -253,7 +252,7 @@ def scale_by_feet(placed: PlacedTrack, part: slice, up: FloatArray, path: Float6
         return 0.0
     root = placed.root[part]
     from_root = soles - root[:, None]
-    sight = line_of_sight(root)
+    sight = unit_vectors(root)
     along_sight = (from_root * sight[:, None]).sum(axis=2, keepdims=True) * sight[:, None]
     walking_m_s = walking_speed(_step_times(placed, up, part))
     shortened = SHORTENED if walking_m_s > 0.0 else SHORTENED[:1]
@@ -378,8 +377,7 @@ def _step_times(placed: PlacedTrack, up: FloatArray, part: slice) -> Float64Arra
 def _facing(placed: PlacedTrack, up: FloatArray) -> FloatArray:
     """Return the (T, 3) horizontal unit vectors in which the pelvis faces."""
     ahead = placed.rotations[:, 0, :, 2]
-    level = ahead - (ahead @ up)[:, None] * up
-    return level / np.maximum(np.linalg.norm(level, axis=1, keepdims=True), 1e-6)
+    return unit_vectors(ahead - (ahead @ up)[:, None] * up)
 
 
 def _reached(along: FloatArray, times: Float64Array) -> BoolArray:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....solver.body import Body
-from ...arrays import BoolArray, Float64Array, FloatArray
+from ...arrays import BoolArray, Float64Array, FloatArray, unit_vectors
 from ...kinematics.axes import transform_points, world_from_level_camera
 from ...kinematics.contact_points import SOLES
 from ..camera.line_segments import Lines
@@ -80,8 +80,7 @@ def _straightness(person: PlacedTrack) -> tuple[FloatArray, FloatArray, FloatArr
         straight = (shank * thigh).sum(1)
         straightness *= np.clip((straight - STANDING_KNEE_COS) / (1 - STANDING_KNEE_COS), 0, 1)
         lower += 0.5 * (shank + thigh)
-    body_up = lower + trunk
-    body_up /= np.maximum(np.linalg.norm(body_up, axis=1, keepdims=True), 1e-9)
+    body_up = unit_vectors(lower + trunk)
     straightness *= np.clip(((lower / 2) * trunk).sum(1), 0, 1) ** 8
     return trunk[person.valid], body_up[person.valid], straightness[person.valid]
 

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture import observe as observe_module
 from scope.scope_addon.capture.camera.intrinsics import Camera
-from scope.scope_addon.capture.clock import StageClock
 from scope.scope_addon.capture.fitting.focal_length import FocalFits
 from scope.scope_addon.capture.frame_observer import FrameObserver
 from scope.scope_addon.capture.long_clips.windowed_clip import lasting
@@ -27,6 +26,7 @@ from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.tracking import landmark_estimator
 from scope.scope_addon.capture.tracking.track import Track
+from scope.scope_addon.clock import StageClock
 from scope.scope_addon.errors import CancelledError
 from scope.solver import load_body
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.kinematics.standing import line_of_sight
+from scope.scope_addon.arrays import unit_vectors
 from scope.scope_addon.live.causal_fit import AFTER_A_PAUSE, FittedFrame
 from scope.scope_addon.live.feet import FootHold, Transition
 
@@ -30,7 +30,7 @@ def stepped():
     t = T_world_camera[:3, 3]
     true = place(omega, root)[2]
     error_m = 0.04 * np.sin(2 * np.pi * 1.3 * times)
-    seen = root + error_m[:, None] * line_of_sight(root)
+    seen = root + error_m[:, None] * unit_vectors(root)
     feet = FootHold(supported)
     held = []
     contact = []
@@ -96,7 +96,7 @@ def test_a_foot_that_is_held_where_the_image_does_not_show_it_is_let_go():
         # Fits stay where the feet are held; once nothing is held, they find the person 60 cm behind
         # that place.
         is_held = is_held and (k < 10 or feet.is_holding)
-        at = root[0] - 0.6 * line_of_sight(root[0]) if is_held else root[0]
+        at = root[0] - 0.6 * unit_vectors(root[0]) if is_held else root[0]
         frame = FittedFrame(omega[0], at, np.ones(len(omega[0])), true[:, :2] / true[:, 2:])
         shown, _ = feet.hold(times[k], np.zeros(supported.P), frame, T_world_camera, True)
         away_m.append(np.linalg.norm(place(shown[None], at[None])[2][0, :4] - true, axis=1).max())

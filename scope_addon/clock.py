@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The time spent in each stage of a capture."""
+"""The stages of a capture: their progress, and the time spent in each."""
 
 from __future__ import annotations
 

@@ -11,12 +11,12 @@ import subprocess
 import sys
 
 import pytest
-from scope.scope_addon.capture.clock import StageClock
+from scope.scope_addon.clock import StageClock
 
 
 def test_stages_add_up_also_when_they_fail(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr("scope.scope_addon.capture.clock.time.perf_counter", lambda: now[0])
+    monkeypatch.setattr("scope.scope_addon.clock.time.perf_counter", lambda: now[0])
     found = StageClock()
     for name, seconds in (("decode", 1.0), ("solver", 2.0), ("decode", 0.5)):
         with found.stage(name):
