@@ -14,7 +14,7 @@ from ...solver.rotations import exp
 from ..arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ..errors import UsageError
 from ..kinematics.contact_points import SOLES, contact_point_positions, with_contact_points
-from ..kinematics.smoothing import interpolate_rotations, smooth_rotations
+from ..kinematics.smoothing import interpolate_rotations, interpolated_places, smooth_rotations
 from ..motion import Motion
 
 
@@ -58,8 +58,7 @@ class Clip:
             frame.
         """
         points = contact_point_positions(with_contact_points(body, betas), *self.parts(body, betas))
-        soles: Float64Array = points[:, : len(SOLES)]
-        return soles
+        return points[:, : len(SOLES)]
 
 
 def clip_from_motion(body: Body, motion: Motion, raw: bool) -> Clip:
@@ -72,8 +71,7 @@ def clip_from_motion(body: Body, motion: Motion, raw: bool) -> Clip:
 def differ(a: Clip, b: Clip) -> BoolArray:
     """Return at which keys (T,) two clips differ."""
     turned = (a.rotations != b.rotations).any((1, 2, 3))
-    different: BoolArray = turned | (a.root != b.root).any(1)
-    return different
+    return turned | (a.root != b.root).any(1)
 
 
 def keys_within(clip: Clip, start: float, end: float) -> IndexArray:
@@ -96,16 +94,13 @@ def sample(clip: Clip, times: Float64Array) -> Clip:
     :return: a clip of T' keys.
     """
     times = np.clip(times, clip.times[0], clip.times[-1])
-    after = np.clip(np.searchsorted(clip.times, times, side="right"), 1, max(len(clip) - 1, 1))
-    before = after - 1
-    if len(clip) == 1:
-        after = before = np.zeros(len(times), int)
-    length = clip.times[after] - clip.times[before]
-    share = np.where(
-        length > 0, (times - clip.times[before]) / np.where(length > 0, length, 1.0), 0.0
-    )
+    found = np.searchsorted(clip.times, times, side="right")
+    before = np.clip(found - 1, 0, max(len(clip) - 2, 0))
+    after = np.minimum(before + 1, len(clip) - 1)
+    length = clip.times[after] - clip.times[before]  # 0 for a single key
+    share = (times - clip.times[before]) / np.maximum(length, 1e-12)
     rotations = interpolate_rotations(clip.rotations[before], clip.rotations[after], share[:, None])
-    root = clip.root[before] + share[:, None] * (clip.root[after] - clip.root[before])
+    root = interpolated_places(clip.root, clip.times, times)
     return Clip(times.astype(float), rotations, root)
 
 

@@ -21,6 +21,7 @@ from ...solver.names import BODY_JOINTS
 from ...solver.rotations import exp, log
 from ..arrays import Float64Array, FloatArray
 from ..errors import MotionFileError
+from ..kinematics.axes import transform_points
 from ..kinematics.foot_skin import UNDER_FLOOR_M, foot_heights
 from ..kinematics.smoothing import smooth_rotations
 from ..motion import Motion
@@ -84,10 +85,8 @@ def distance_from_pin(motion: Motion, pin: Pin, place: Float64Array | None = Non
         return 0.0
     T = motion.world_from_camera[rows[0]]
     if place is None:
-        place = (
-            T[:3, :3] @ motion.joints_cam[rows[0], BODY_JOINTS.index(pin.joint)].astype(float)
-            + T[:3, 3]
-        )
+        joint = motion.joints_cam[rows[0], BODY_JOINTS.index(pin.joint)].astype(float)
+        (place,) = transform_points(T, joint[None])
     camera = T, motion.intrinsics_of_frames[rows[0]]
     return distance_to(pin_in_world(motion, pin), place, camera)
 
@@ -234,7 +233,7 @@ def _in_world(pin: Pin, transform: Float64Array | None) -> Pin:
     """Return a pin in a world that ``transform`` (4, 4) has moved; None: it was not moved."""
     if pin.position is None or transform is None:
         return pin
-    x, y, z = transform[:3, :3] @ pin.position + transform[:3, 3]
+    ((x, y, z),) = transform_points(transform, np.array([pin.position]))
     return replace(pin, position=(float(x), float(y), float(z)))
 
 
@@ -343,8 +342,7 @@ def _lowest_without(motion: Motion, body: Body, removed: Sequence[Correction]) -
     """Return the height of the lower foot in each frame, (T,), without some of the corrections."""
     kept = tuple(c for c in corrections_of(motion) if c not in removed)
     reduced = with_corrections(motion, body, kept)
-    lowest: Float64Array = foot_heights(reduced, body).min(axis=1)
-    return lowest
+    return foot_heights(reduced, body).min(axis=1)
 
 
 def _frames_between(correction: Contact | Pin, frame: int) -> int:

@@ -27,7 +27,7 @@ import numpy as np
 from ...solver.body import Body
 from ...solver.rotations import exp, log, shortest_turn
 from ..arrays import Float64Array, FloatArray, IndexArray
-from ..kinematics.axes import UP
+from ..kinematics.axes import UP, transposed
 from ..kinematics.mirrored_limbs import LIMBS, other_side
 from .clip import Clip
 from .corrections import BODY, DepthFlip
@@ -138,15 +138,12 @@ def _mirrored_limb(
         bones = (middle - start, last - middle), (place - start, tip - place)
         new = _turned_bones((R[:, first], R[:, second]), *bones, hinge)
         R_parent = R[:, body.parents[first]]
-        rotations = np.stack(
-            [np.swapaxes(R_parent, 1, 2) @ new[0], np.swapaxes(new[0], 1, 2) @ new[1]], axis=1
-        )
+        rotations = np.stack([transposed(R_parent) @ new[0], transposed(new[0]) @ new[1]], axis=1)
         rest = body.rest_joints(betas)
         twist = _twists(rotations[:, 0], rest[second] - rest[first])
         found.append((float(twist.mean()), rotations))
     is_unnatural = len(found) == 2 and found[0][0] > found[1][0] + _MORE_TWIST
-    chosen: Float64Array = found[1][1] if is_unnatural else found[0][1]
-    return chosen
+    return found[1][1] if is_unnatural else found[0][1]
 
 
 def _on_ray(
@@ -170,8 +167,7 @@ def _on_ray(
     side = np.where((ray * bone).sum(axis=1) >= 0.0, 1.0, -1.0) * (-1.0 if mirrored else 1.0)
     depth = np.maximum(nearest + side * half, _NEAREST_M)
     direction = _unit(depth[:, None] * ray - start)
-    place: Float64Array = start + np.linalg.norm(bone, axis=1, keepdims=True) * direction
-    return place
+    return start + np.linalg.norm(bone, axis=1, keepdims=True) * direction
 
 
 def _turned_bones(
@@ -207,8 +203,7 @@ def _angle_about(axis: Float64Array, start: Float64Array, end: Float64Array) -> 
     across = np.cross(axis, start)
     sine = (across * end).sum(axis=1)
     cosine = (np.cross(across, axis) * end).sum(axis=1)
-    angle: Float64Array = np.arctan2(sine, cosine)
-    return angle
+    return np.arctan2(sine, cosine)
 
 
 def _twists(rotations: Float64Array, bone: Float64Array) -> Float64Array:
@@ -218,9 +213,8 @@ def _twists(rotations: Float64Array, bone: Float64Array) -> Float64Array:
     swing = shortest_turn(
         np.broadcast_to(bone, (len(rotations), 3)), (rotations @ bone[:, None])[..., 0]
     )
-    twist: Float64Array = log(np.swapaxes(swing, -1, -2) @ rotations)
-    angles: Float64Array = np.linalg.norm(twist, axis=-1)
-    return angles
+    twist: Float64Array = log(transposed(swing) @ rotations)
+    return np.linalg.norm(twist, axis=-1)
 
 
 def _blend_ends(clip: Clip, span: IndexArray, joints: IndexArray) -> None:
@@ -244,5 +238,4 @@ def _blend_ends(clip: Clip, span: IndexArray, joints: IndexArray) -> None:
 
 def _unit(vectors: Float64Array) -> Float64Array:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    directions: Float64Array = vectors / np.maximum(length, 1e-12)
-    return directions
+    return vectors / np.maximum(length, 1e-12)

@@ -19,7 +19,7 @@ import numpy as np
 from ...solver.body import Body
 from ...solver.rotations import exp, log, shortest_turn
 from ..arrays import Float64Array, FloatArray
-from ..kinematics.axes import UP
+from ..kinematics.axes import UP, rotated, transform_points
 from ..kinematics.foot_skin import FootSkin
 from ..kinematics.smoothing import gaussian_smooth
 from ..kinematics.standing import standing_probability
@@ -112,16 +112,17 @@ def moved_motion(motion: Motion, body: Body, transform: Float64Array) -> Motion:
         turned = getattr(motion, poses).copy()
         turned[:, :3] = log(transform[:3, :3] @ exp(turned[:, :3].astype(float)))
         before = getattr(motion, trans)
-        pelvis = (rest + before) @ transform[:3, :3].T + transform[:3, 3]
+        pelvis = transform_points(transform, rest + before)
         changed |= {poses: turned, trans: (pelvis - rest).astype(before.dtype)}
     return replace(motion, **changed)
 
 
 def moved_clip(clip: Clip, transform: Float64Array) -> Clip:
-    """Move a clip in the world; ``transform`` (4, 4) is rigid."""
+    """Move a clip in the world; ``transform``, (4, 4) or one for each key (T, 4, 4), is rigid."""
+    turn = transform[..., :3, :3]
     rotations = clip.rotations.copy()
-    rotations[:, 0] = transform[:3, :3] @ rotations[:, 0]
-    return Clip(clip.times, rotations, clip.root @ transform[:3, :3].T + transform[:3, 3])
+    rotations[:, 0] = turn @ rotations[:, 0]
+    return Clip(clip.times, rotations, rotated(turn, clip.root) + transform[..., :3, 3])
 
 
 def refloor(

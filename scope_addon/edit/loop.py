@@ -11,6 +11,7 @@ from ...solver.body import Body
 from ...solver.rotations import exp, log
 from ..arrays import BoolArray, Float64Array, FloatArray
 from ..errors import UsageError
+from ..kinematics.axes import transposed
 from .clip import Clip, keys_within
 from .root_motion import floor_trajectory, relative_to_trajectory
 
@@ -109,15 +110,13 @@ def _moves(joints: Float64Array, least: float) -> BoolArray:
     apart = np.sqrt(_squared_distances(joints.reshape(len(joints), -1)) / joints.shape[1])
     # The largest distance from pose a among the poses from a to b.
     farthest = np.maximum.accumulate(np.triu(apart), axis=1)
-    moves: BoolArray = (farthest >= least) & (apart <= 0.5 * farthest)
-    return moves
+    return (farthest >= least) & (apart <= 0.5 * farthest)
 
 
 def _squared_distances(points: Float64Array) -> Float64Array:
     """Return the squared distances (N, N) between points (N, D)."""
     squares = (points**2).sum(1)
-    apart: Float64Array = np.maximum(squares[:, None] + squares[None] - 2 * points @ points.T, 0.0)
-    return apart
+    return np.maximum(squares[:, None] + squares[None] - 2 * points @ points.T, 0.0)
 
 
 def close_cycle(clip: Clip, cycle: Cycle, blend: float = 0.2) -> Clip:
@@ -139,7 +138,7 @@ def close_cycle(clip: Clip, cycle: Cycle, blend: float = 0.2) -> Clip:
     ahead = exp(np.array([0.0, 0.0, heading]))
     goal = rotations[0].copy()
     goal[0] = ahead @ goal[0]
-    missing = log(np.swapaxes(rotations[-1], -1, -2) @ goal)
+    missing = log(transposed(rotations[-1]) @ goal)
     rotations = rotations @ exp(s[:, None, None] * missing)
     root[:, 2] += s * (root[0, 2] - root[-1, 2])
     return Clip(times, rotations, root)
@@ -153,5 +152,4 @@ def _vertical_turns(rotations: Float64Array) -> Float64Array:
     turns = np.einsum("bik,ajk->abij", level, level)
     sine = turns[..., 1, 0] - turns[..., 0, 1]
     cosine = turns[..., 0, 0] + turns[..., 1, 1]
-    angles: Float64Array = np.arctan2(sine, cosine)
-    return angles
+    return np.arctan2(sine, cosine)

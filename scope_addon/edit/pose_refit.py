@@ -271,8 +271,7 @@ class PoseRefit:
         # Legs bend rather than let the body move away.
         share = 0.1 if trunk and not _bent_by(joints) else 1.0
         rotation = PELVIS_ROTATION * (0.1 if trunk else 1.0)
-        posed: PosePriors = PosePriors([0], R[None], t[None], [rotation], [PELVIS_POSITION * share])
-        return posed
+        return PosePriors([0], R[None], t[None], [rotation], [PELVIS_POSITION * share])
 
     def _weights(self, joints: tuple[str, ...]) -> Float64Array:
         """Return the weights (K,) of the joints' prior."""
@@ -311,8 +310,7 @@ def pixel_of(camera: Camera, point: Float64Array) -> Float64Array:
     """Project a point (3,), world, to a pixel (2,)."""
     T, K = camera
     p = K @ (T[:3, :3].T @ (np.asarray(point, float) - T[:3, 3]))
-    pixel: Float64Array = p[:2] / p[2]
-    return pixel
+    return p[:2] / p[2]
 
 
 def nearest_on_ray(camera: Camera, pixel: Float64Array, point: Float64Array) -> Float64Array:
@@ -328,8 +326,7 @@ def _ray(camera: Camera, pixel: Float64Array) -> Float64Array:
     """Return the unit vector (3,), world, from a camera to what it sees in a pixel (2,)."""
     T, K = camera
     ray = T[:3, :3] @ np.linalg.solve(K, np.array([*pixel, 1.0]))
-    unit: Float64Array = ray / np.linalg.norm(ray)
-    return unit
+    return ray / np.linalg.norm(ray)
 
 
 def point_at_depth(camera: Camera, pixel: Float64Array, point: Float64Array) -> Float64Array:
@@ -349,8 +346,7 @@ def point_at_depth(camera: Camera, pixel: Float64Array, point: Float64Array) -> 
     # The ray meets the plane beside or behind the camera, or nowhere.
     if along < 1e-3 * float(np.linalg.norm(normal)):
         return nearest_on_ray(camera, pixel, point)
-    place: Float64Array = center + ray * (float((point - center) @ normal) / along)
-    return place
+    return center + ray * (float((point - center) @ normal) / along)
 
 
 def within_reach(

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Float64Array
-from ..kinematics.axes import R_WORLD_MODEL
+from ..kinematics.axes import R_WORLD_MODEL, rotated, transposed
 from ..kinematics.smoothing import gaussian_smooth
 from .clip import Clip
 
@@ -41,8 +41,8 @@ def relative_to_trajectory(clip: Clip, positions: Float64Array, angles: Float64A
     """
     turn = about_z(angles)
     rotations = clip.rotations.copy()
-    rotations[:, 0] = np.swapaxes(turn, 1, 2) @ rotations[:, 0]
-    return Clip(clip.times, rotations, np.einsum("tji,tj->ti", turn, clip.root - positions))
+    rotations[:, 0] = transposed(turn) @ rotations[:, 0]
+    return Clip(clip.times, rotations, rotated(transposed(turn), clip.root - positions))
 
 
 def with_trajectory(clip: Clip, positions: Float64Array, angles: Float64Array) -> Clip:
@@ -54,7 +54,7 @@ def with_trajectory(clip: Clip, positions: Float64Array, angles: Float64Array) -
     turn = about_z(angles)
     rotations = clip.rotations.copy()
     rotations[:, 0] = turn @ rotations[:, 0]
-    return Clip(clip.times, rotations, np.einsum("tij,tj->ti", turn, clip.root) + positions)
+    return Clip(clip.times, rotations, rotated(turn, clip.root) + positions)
 
 
 def about_z(angles: Float64Array) -> Float64Array:

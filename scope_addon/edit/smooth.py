@@ -12,6 +12,7 @@ import numpy as np
 from ...solver.body import Body
 from ..arrays import Float64Array
 from ..errors import UsageError
+from ..kinematics.axes import transposed
 from ..kinematics.frame_blocks import by_blocks
 from ..kinematics.leg_reach import LEGS, move_ends
 from ..kinematics.smoothing import (
@@ -73,7 +74,7 @@ def _smoothed(motion: Motion, body: Body, raw: Clip, finished: Clip, strength: f
         return _with_resting_feet(calm, finished, motion, body)
     plain = _filtered(raw, motion, 1.0)
     wanted = _filtered(raw, motion, strength)
-    correction = np.swapaxes(plain.rotations, -1, -2) @ finished.rotations
+    correction = transposed(plain.rotations) @ finished.rotations
     none = np.broadcast_to(np.eye(3), correction.shape)
     correction = interpolate_rotations(none, correction, np.full(correction.shape[:2], strength))
     return Clip(
@@ -117,9 +118,9 @@ def _smoothed_further(clip: Clip, strength: float) -> Clip:
     )
     R = np.concatenate(
         [
-            R[0] @ np.swapaxes(R[before], -1, -2) @ R[0],
+            R[0] @ transposed(R[before]) @ R[0],
             R,
-            R[-1] @ np.swapaxes(R[after], -1, -2) @ R[-1],
+            R[-1] @ transposed(R[after]) @ R[-1],
         ]
     )
     smooth_rotations(R, times, ROTATION_CUTOFF_HZ / beyond, out=R)
@@ -132,8 +133,7 @@ def _reflected(root: Float64Array, end: Float64Array) -> Float64Array:
     as end² / d.
     """
     squared = np.maximum(np.sum(root * root, axis=1, keepdims=True), 1e-12)
-    reflected: Float64Array = (2 * (root @ end)[:, None] * end - float(end @ end) * root) / squared
-    return reflected
+    return (2 * (root @ end)[:, None] * end - float(end @ end) * root) / squared
 
 
 def _with_resting_feet(calm: Clip, finished: Clip, motion: Motion, body: Body) -> Clip:

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ...solver.rotations import exp, log
 from ..arrays import BoolArray, Float64Array, FloatArray, IndexArray
-from ..kinematics.axes import UP
+from ..kinematics.axes import UP, transposed
 from ..kinematics.contact_points import FOOT_PARTS, SOLES
 from ..kinematics.standing import standing_probability
 from ..scene_gaps import with_scene_gaps
@@ -82,10 +82,7 @@ class Shot:
 
     def seen_at(self, times: Float64Array) -> BoolArray:
         """Return whether the person was seen in the frames nearest to times, (T,)."""
-        seen: BoolArray = self.valid[
-            np.searchsorted(0.5 * (self.times[1:] + self.times[:-1]), times)
-        ]
-        return seen
+        return self.valid[np.searchsorted(0.5 * (self.times[1:] + self.times[:-1]), times)]
 
     def time(self, frame: int) -> float:
         """Return the time of a source frame."""
@@ -291,7 +288,7 @@ class _Correction:
             rotations, root = self._refit.solve(
                 *pose, tuple(track.joints), points, track.cameras[h]
             )
-            turns.append(log(np.swapaxes(before.rotations[k], -1, -2) @ rotations))
+            turns.append(log(transposed(before.rotations[k]) @ rotations))
             shifts.append(root - before.root[k])
         return np.array(turns), np.array(shifts)
 
@@ -330,8 +327,7 @@ class _Correction:
         """
         own = [k for k, part in enumerate(FOOT_PARTS) if limb_of(part) == limb_of(track.joints[0])]
         lowest = heights[:, own].min(axis=1, initial=np.inf)
-        rise: Float64Array = np.maximum(self._floor[track.span] - lowest, 0.0)[:, None] * UP
-        return rise
+        return np.maximum(self._floor[track.span] - lowest, 0.0)[:, None] * UP
 
     def _share(self, track: _Track, key: int) -> float:
         """Return 1 at a track's pinned keys, fading to 0 at the ends of its span."""

@@ -15,6 +15,7 @@ from ...solver.body import Body
 from ...solver.rotations import exp, log
 from ..arrays import BoolArray, Float64Array
 from ..errors import UsageError
+from ..kinematics.axes import transposed
 from .clip import Clip, keys_within
 
 _FINGERS = ("index", "middle", "pinky", "ring", "thumb")
@@ -50,7 +51,7 @@ def interpolate(clip: Clip, start: float, end: float) -> Clip:
     length = clip.times[b] - clip.times[a]
     s = ((clip.times[span] - clip.times[a]) / length)[:, None, None]
     base = clip.rotations[a]
-    target = log(np.swapaxes(base, -1, -2) @ clip.rotations[b])
+    target = log(transposed(base) @ clip.rotations[b])
     before = _velocities(clip, a, -1)
     after = _velocities(clip, b, +1)
     v0 = _limited(before[0] * length, target)
@@ -136,13 +137,12 @@ def _hermite(
     """Evaluate the cubic from p0 to p1 with derivatives v0, v1 with respect to s, 0 to 1."""
     s2 = s * s
     s3 = s * s * s
-    value: Float64Array = (
+    return (
         (2 * s3 - 3 * s2 + 1) * p0
         + (s3 - 2 * s2 + s) * v0
         + (3 * s2 - 2 * s3) * p1
         + (s3 - s2) * v1
     )
-    return value
 
 
 def _limited(v: Float64Array, step: Float64Array) -> Float64Array:
@@ -151,8 +151,7 @@ def _limited(v: Float64Array, step: Float64Array) -> Float64Array:
     """
     size = np.linalg.norm(v, axis=-1, keepdims=True)
     most = 3.0 * np.linalg.norm(step, axis=-1, keepdims=True)
-    limited: Float64Array = v * np.minimum(1.0, most / np.maximum(size, 1e-12))
-    return limited
+    return v * np.minimum(1.0, most / np.maximum(size, 1e-12))
 
 
 def _velocities(clip: Clip, k: int, side: int) -> tuple[Float64Array, Float64Array]:
@@ -166,7 +165,7 @@ def _velocities(clip: Clip, k: int, side: int) -> tuple[Float64Array, Float64Arr
     if i < 0 or j >= len(clip):
         return np.zeros(clip.rotations.shape[1:3]), np.zeros(3)
     seconds = clip.times[j] - clip.times[i]
-    turn = log(np.swapaxes(clip.rotations[i], -1, -2) @ clip.rotations[j])
+    turn = log(transposed(clip.rotations[i]) @ clip.rotations[j])
     return turn / seconds, (clip.root[j] - clip.root[i]) / seconds
 
 
@@ -204,8 +203,7 @@ def are_far_apart(known: Float64Array, reach: Float64Array) -> BoolArray:
     :param known: (H,) seconds, increasing.
     :param reach: (H,) seconds.
     """
-    far: BoolArray = np.diff(known) > 2 * (reach[:-1] + reach[1:])
-    return far
+    return np.diff(known) > 2 * (reach[:-1] + reach[1:])
 
 
 def _monotone_cubic(times: Float64Array, x: Float64Array, y: Float64Array) -> Float64Array:

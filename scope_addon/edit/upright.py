@@ -23,7 +23,7 @@ from ...solver.body import Body
 from ...solver.rotations import exp, log, shortest_turn
 from ..arrays import Float64Array
 from ..errors import UsageError
-from ..kinematics.axes import UP
+from ..kinematics.axes import UP, transposed
 from ..kinematics.standing import standing_probability
 from ..motion import Motion
 from .clip import clip_from_motion
@@ -95,7 +95,7 @@ def _levelling(motion: Motion, body: Body) -> Float64Array:
     before = clip_from_motion(body, with_corrections(motion, body, without), raw=False)
     after = clip_from_motion(body, motion, raw=False)
     # The median, because pins turn the body in a few frames.
-    turns = after.rotations[:, 0] @ np.swapaxes(before.rotations[:, 0], 1, 2)
+    turns = after.rotations[:, 0] @ transposed(before.rotations[:, 0])
     out[:3, :3] = exp(np.median(log(turns), axis=0))
     out[:3, 3] = np.median(after.root - before.root @ out[:3, :3].T, axis=0)
     return out

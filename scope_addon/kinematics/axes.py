@@ -60,3 +60,21 @@ def world_from_level_camera(up_camera: ArrayLike, height: float = 0.0) -> Float6
 def transform_points(T_a_b: FloatArray, points_b: FloatArray) -> FloatArray:
     """Return ``p_a = R p_b + t`` for (..., 4, 4) transforms and (..., N, 3) points."""
     return points_b @ np.swapaxes(T_a_b[..., :3, :3], -1, -2) + T_a_b[..., None, :3, 3]
+
+
+def rotated(rotations: FloatArray, vectors: FloatArray) -> Float64Array:
+    """Return the vectors (..., 3) rotated by (..., 3, 3)."""
+    return (rotations @ vectors[..., None])[..., 0]
+
+
+def transposed(rotations: FloatArray) -> Float64Array:
+    """Return the inverse rotations (..., 3, 3)."""
+    return np.swapaxes(rotations, -1, -2)
+
+
+def unscaled(matrices: FloatArray) -> Float64Array:
+    """Return the orthogonal matrices (..., 3, 3) nearest to those that scale or shear, which may
+    mirror.
+    """
+    U, _, Vt = np.linalg.svd(matrices)
+    return U @ Vt

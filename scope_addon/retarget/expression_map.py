@@ -155,8 +155,7 @@ def weighted_sum(factors: Mapping[str, float], weights: FloatArray) -> Float64Ar
     :param weights: (T, 52) in the order of `EXPRESSIONS`.
     """
     columns = [EXPRESSIONS.index(name) for name in factors]
-    summed: Float64Array = weights[:, columns].astype(float) @ np.array(list(factors.values()))
-    return summed
+    return weights[:, columns].astype(float) @ np.array(list(factors.values()))
 
 
 def guess_expression_map(keys: Iterable[str]) -> ExpressionMap:

@@ -131,8 +131,7 @@ def _around(
     ahead = seen / max(float(np.linalg.norm(seen)), 1e-12)
     left = np.array([1.0, 0.0, 0.0]) - ahead[0] * ahead
     axes = np.stack([left, np.cross(ahead, left), ahead], axis=1)
-    moved: Float64Array = exp(np.radians(turned) @ axes.T) @ seen - seen
-    return moved
+    return exp(np.radians(turned) @ axes.T) @ seen - seen
 
 
 def _rig_of(bones: Collection[str]) -> str | None:

@@ -34,11 +34,11 @@ from ...solver.rotations import exp, shortest_turn
 from ..arrays import BoolArray, Float64Array, FloatArray
 from ..edit.clip import Clip
 from ..edit.root_motion import about_z
-from ..kinematics.axes import UP
+from ..kinematics.axes import UP, rotated
 from ..kinematics.foot_skin import FootSkin, lower_floors
 from ..kinematics.leg_reach import cross, knee_turn
 from ..kinematics.standing import standing_probability
-from .skeleton import Pose, Skeleton, head_positions, rotated
+from .skeleton import Pose, Skeleton, head_positions
 
 # Thickness of the sole, and length of the heel region.
 _SOLE_M = 0.015
@@ -261,14 +261,14 @@ def solve_leg(
         np.linalg.norm(goal - hip, axis=1), np.abs(a - b) + 1e-6, _MAX_STRETCH * (a + b)
     )
     at_knee = knee_turn(upper, lower, sideways, distance)
-    lower = np.einsum("tij,tj->ti", at_knee, lower)
+    lower = rotated(at_knee, lower)
     normal = cross(upper, lower)
     size = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.where(size > 1e-4 * (a * b)[:, None], normal / np.maximum(size, 1e-12), sideways)
     bend = np.arccos(np.clip((np.sum(upper * lower, axis=1)) / (a * b), -1, 1))
     wanted = np.arccos(np.clip((distance**2 - a**2 - b**2) / (2 * a * b), -1, 1))
     rest = exp(normal * (wanted - bend)[:, None])
-    swing = shortest_turn(upper + np.einsum("tij,tj->ti", rest, lower), goal - hip)
+    swing = shortest_turn(upper + rotated(rest, lower), goal - hip)
     return swing @ thigh, swing @ rest @ at_knee @ shin
 
 
@@ -353,8 +353,7 @@ def flat_toes(
         np.stack([tip[..., 1], -tip[..., 0], np.zeros_like(across)], axis=-1)
         / np.maximum(across, 1e-9)[..., None]
     )
-    raised: Float64Array = exp(side * lift[..., None]) @ toe
-    return raised
+    return exp(side * lift[..., None]) @ toe
 
 
 def pelvis_drop(
@@ -383,5 +382,4 @@ def pelvis_drop(
     width = np.arange(-frames, frames + 1)
     near = np.clip(np.arange(len(needed))[:, None] + width, 0, len(needed) - 1)
     weight = 1 + np.cos(np.pi * width / (frames + 1))
-    smooth: Float64Array = needed[near].max(axis=1)[near] @ (weight / weight.sum())
-    return smooth
+    return needed[near].max(axis=1)[near] @ (weight / weight.sum())

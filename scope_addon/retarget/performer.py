@@ -23,7 +23,7 @@ from ...solver.body import Body
 from ...solver.rotations import log, shortest_turn
 from ..arrays import Float64Array
 from ..errors import MotionFileError
-from ..kinematics.axes import R_WORLD_MODEL, UP
+from ..kinematics.axes import R_WORLD_MODEL, UP, rotated, transposed
 from ..kinematics.frame_blocks import by_blocks
 from ..kinematics.smoothing import interpolate_rotations
 from ..notices import Notice, notice
@@ -79,7 +79,7 @@ class Performer:
         for place, part in enumerate(part_of):
             row.setdefault(part, place)
         R_first, heads = _pose(self.file, self.frame, self.R_world_file)
-        tails = heads + (R_first @ self.file.ends[..., None])[..., 0]
+        tails = heads + rotated(R_first, self.file.ends)
         whole = RestPose(self.file.names, self.file.parents, heads, tails)
         above = [[k for k in whole.chains[joint][:-1] if k in joints] for joint in joints]
         parents = np.array([joints.index(chain[-1]) if chain else -1 for chain in above], np.intp)
@@ -93,7 +93,7 @@ class Performer:
         )
         alignment = rest_alignment(skeleton, part_of, row, rest @ R_WORLD_MODEL.T, index)
         # To the file's axes at rest from those of the body's part in its T-pose.
-        R_joint_part = np.swapaxes(alignment @ R_first[joints], -1, -2)
+        R_joint_part = transposed(alignment @ R_first[joints])
         file_legs = leg_length(skeleton.heads, row)
         if not file_legs > 0:
             raise MotionFileError(
@@ -110,7 +110,7 @@ class Performer:
             R_world_part = turns @ R_WORLD_MODEL
             local = R_world_part.copy()
             R_world_parent = R_world_part[:, body.parents[1:]]
-            local[:, 1:] = np.swapaxes(R_world_parent, -1, -2) @ R_world_part[:, 1:]
+            local[:, 1:] = transposed(R_world_parent) @ R_world_part[:, 1:]
             wanted = scale * points[:, hips].mean(axis=1) @ self.R_world_file.T
             at_origin = body.forward_kinematics(local, np.zeros((len(values), 3)), betas)[1]
             pelvis = at_origin[:, 0] + wanted - at_origin[:, body_hips].mean(axis=1)
@@ -260,8 +260,7 @@ def _limbs(
         chosen = points[:, joints]
     trunk = chosen[:, :1] - chosen[:, 1:3].mean(axis=1, keepdims=True)
     along = np.concatenate([trunk, chosen[:, 1:3] - chosen[:, 3:]], axis=1)
-    unit: Float64Array = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-12)
-    return unit
+    return along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-12)
 
 
 def _of_parts(turns: Float64Array, part_of: list[str], body: Body) -> Float64Array:

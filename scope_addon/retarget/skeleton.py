@@ -8,9 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from ..arrays import Float64Array, IndexArray
+from ..kinematics.axes import rotated, transposed
 
 
 @dataclass(frozen=True)
@@ -35,16 +34,14 @@ class Skeleton:
         """From the head of each bone's carrier to its own (B, 3), metres, in its axes; undefined
         for roots.
         """
-        out: Float64Array = rotated(
-            np.swapaxes(self.rotations[self.carriers], 1, 2), self.heads - self.heads[self.carriers]
+        return rotated(
+            transposed(self.rotations[self.carriers]), self.heads - self.heads[self.carriers]
         )
-        return out
 
     @cached_property
     def rested(self) -> Float64Array:
         """R_parent0ᵀ R_b0 of each bone (B, 3, 3); undefined without a parent."""
-        out: Float64Array = np.swapaxes(self.rotations[self.parents], 1, 2) @ self.rotations
-        return out
+        return transposed(self.rotations[self.parents]) @ self.rotations
 
 
 @dataclass(frozen=True)
@@ -76,8 +73,7 @@ def basis(rig: Skeleton, world: Float64Array) -> Float64Array:
     rested = world[:, rig.parents] @ rig.rested
     roots = rig.parents < 0
     rested[:, roots] = rig.rotations[roots]
-    out: Float64Array = np.swapaxes(rested, 2, 3) @ world
-    return out
+    return transposed(rested) @ world
 
 
 def head_positions(rig: Skeleton, world: Float64Array) -> Float64Array:
@@ -93,9 +89,3 @@ def head_positions(rig: Skeleton, world: Float64Array) -> Float64Array:
         else:
             heads[:, b] += heads[:, carrier]
     return heads
-
-
-def rotated(rotations: Float64Array, vectors: Float64Array) -> Float64Array:
-    """Return the vectors (..., 3) rotated by (..., 3, 3)."""
-    out: Float64Array = (rotations @ vectors[..., None])[..., 0]
-    return out

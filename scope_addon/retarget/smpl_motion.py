@@ -24,6 +24,7 @@ from ...solver.rotations import log, matrix_from_quaternion
 from ...solver.smpl_family import FACE_JOINTS, HAND_ORDER, SKELETONS, gender_of
 from ..arrays import Float32Array, Float64Array
 from ..errors import MotionFileError
+from ..kinematics.axes import transposed
 from ..kinematics.frame_blocks import by_blocks
 from ..untrusted.tables import read_tables
 
@@ -432,20 +433,20 @@ def _from_six(values: Float64Array, what: str) -> Float64Array:
     them has two vectors of length 1 at right angles.
     """
     in_rows = values.reshape(*values.shape[:-1], 2, 3)
-    in_columns = np.swapaxes(values.reshape(*values.shape[:-1], 3, 2), -1, -2)
+    in_columns = transposed(values.reshape(*values.shape[:-1], 3, 2))
 
     def deviation(pairs: Float64Array) -> float:
-        gram = pairs @ np.swapaxes(pairs, -1, -2)
+        gram = pairs @ transposed(pairs)
         return float(np.abs(gram - np.eye(2)).mean())
 
     is_rows = deviation(in_rows) <= deviation(in_columns)
     first, second = np.moveaxis(in_rows if is_rows else in_columns, -2, 0)
     matrices = np.stack([first, second, np.cross(first, second)], axis=-2)
-    return matrices if is_rows else np.swapaxes(matrices, -1, -2)
+    return matrices if is_rows else transposed(matrices)
 
 
 def _logarithms(matrices: Float64Array, what: str) -> Float32Array:
-    gram = np.swapaxes(matrices, -1, -2) @ matrices
+    gram = transposed(matrices) @ matrices
     if np.abs(gram - np.eye(3)).max() > _ORTHONORMAL or np.linalg.det(matrices).min() < 0.5:
         raise MotionFileError(f"{what} holds matrices that are not rotations; choose another file")
     return log(matrices).astype(np.float32)

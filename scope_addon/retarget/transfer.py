@@ -235,8 +235,7 @@ def _heading_turn(along: Float64Array, wanted: Float64Array) -> Float64Array:
     if np.linalg.norm(flat) <= 0.3 * np.linalg.norm(along):
         return np.eye(3)
     angle = np.arctan2(goal[1], goal[0]) - np.arctan2(flat[1], flat[0])
-    turn: Float64Array = exp(UP * ((angle + np.pi) % (2 * np.pi) - np.pi))
-    return turn
+    return exp(UP * ((angle + np.pi) % (2 * np.pi) - np.pi))
 
 
 def _palm_alignment(
@@ -262,5 +261,4 @@ def _palm_alignment(
             return None
         axes = np.stack([along, np.cross(normal, along), normal], axis=1)
         palms.append(axes / np.linalg.norm(axes, axis=0))
-    alignment: Float64Array = palms[1] @ palms[0].T
-    return alignment
+    return palms[1] @ palms[0].T

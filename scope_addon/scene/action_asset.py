@@ -17,6 +17,7 @@ import numpy as np
 from ...solver.errors import InputError
 from ..arrays import Float32Array, Float64Array
 from ..errors import UsageError
+from ..kinematics.axes import transform_points
 from ..motion import Motion
 from ..review_spans import find_review_spans
 from ..untrusted.files import check_regular
@@ -83,7 +84,7 @@ def set_preview(action: bpy.types.Action, armature: bpy.types.Object, frame: flo
             return
         place = np.array(posed.matrix_world, float)
         ends = np.array([[*bone.head, *bone.tail] for bone in bones], float).reshape(-1, 2, 3)
-        ends = ends @ place[:3, :3].T + place[:3, 3]
+        ends = transform_points(place, ends)
         scale = float(np.cbrt(abs(np.linalg.det(place[:3, :3]))))
         radii = scale * np.array([_radius(bone) for bone in bones])
         colors = np.array([SIDES[side_of(bone.name)] for bone in bones])
@@ -182,10 +183,7 @@ def _skeleton_picture(
     color = (blocks[..., :3] * blocks[..., 3:]).mean(axis=(1, 3)) / np.maximum(alpha, 1e-6)[
         ..., None
     ]
-    out: Float32Array = np.concatenate([np.clip(color, 0.0, 1.0), alpha[..., None]], axis=2).astype(
-        np.float32
-    )
-    return out
+    return np.concatenate([np.clip(color, 0.0, 1.0), alpha[..., None]], axis=2).astype(np.float32)
 
 
 def _on_screen(

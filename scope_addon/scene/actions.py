@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Float32Array, Float64Array
 from ..errors import UsageError
-from .datablocks import changed, shape_keys_of
+from .datablocks import action_of, changed, shape_keys_of
 
 # Values of Blender's keyframe interpolation enum, which foreach_set takes as integers.
 INTERPOLATION = {"CONSTANT": 0, "LINEAR": 1, "BEZIER": 2}
@@ -168,10 +168,10 @@ def shape_key_path(key_name: str) -> str:
 
 def fcurves(datablock: bpy.types.ID) -> list[bpy.types.FCurve]:
     """Return the F-curves that animate a datablock, in any supported Blender."""
-    animation = datablock.animation_data
-    if animation is None or animation.action is None:
+    action = action_of(datablock)
+    if action is None:
         return []
-    return fcurves_in_slot(animation.action, getattr(animation, "action_slot", None))
+    return fcurves_in_slot(action, getattr(datablock.animation_data, "action_slot", None))
 
 
 def fcurves_in_slot(

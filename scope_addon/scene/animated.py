@@ -10,7 +10,7 @@ import bpy
 from .actions import fcurves
 from .capture_parts import parts_of
 from .character.root_object import root_object
-from .datablocks import captures_of
+from .datablocks import action_of, captures_of, with_data
 from .footage_strip import is_footage, strips_of
 from .rig_action import is_retargeted
 from .timing import action_strips
@@ -53,7 +53,7 @@ def _blocks_of(objects: Iterable[bpy.types.Object]) -> set[bpy.types.ID]:
     """Return objects with what they are made of: data, shape keys, materials, nodes."""
     found: list[bpy.types.ID | None] = []
     for obj in objects:
-        found += [obj, obj.data, getattr(obj.data, "shape_keys", None)]
+        found += with_data(obj)
         found += [slot.material for slot in obj.material_slots]
         found += [getattr(modifier, "node_group", None) for modifier in obj.modifiers]
         found += [system.settings for system in obj.particle_systems]
@@ -81,10 +81,7 @@ def _has_keys(block: bpy.types.ID, *, retargeted: bool = True) -> bool:
 
     :param retargeted: count actions that retargeting has written.
     """
-    animation = getattr(block, "animation_data", None)
-    if animation is None:
-        return False
-    actions = [strip.action for strip in action_strips(animation)]
+    actions = [strip.action for strip in action_strips(block)]
     if fcurves(block):
-        actions.append(animation.action)
+        actions.append(action_of(block))
     return any(retargeted or not is_retargeted(action) for action in actions)

@@ -41,6 +41,7 @@ from .datablocks import (
     is_part,
     remove_blocks,
     short_name,
+    with_data,
 )
 from .packed_motion import motion_texts
 from .transaction import all_or_nothing
@@ -400,16 +401,12 @@ def _data_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.ID]:
     for obj in objects:
         data = obj.data
         found += [data, *(slot.material for slot in obj.material_slots)]
-        owners = [obj, data, getattr(data, "shape_keys", None)]
+        owners = with_data(obj)
         if obj.type == "CAMERA":
             pictures = [each.image or each.clip for each in data.background_images]
             found += pictures
             owners += pictures
-        for owner in owners:
-            animation = getattr(owner, "animation_data", None)
-            if animation is not None:
-                strips = [strip for track in animation.nla_tracks for strip in track.strips]
-                found += [animation.action, *(strip.action for strip in strips)]
+        found += [action for owner in owners for action in timing.played_actions(owner)]
     return [block for block in dict.fromkeys(found) if block is not None and block.library is None]
 
 

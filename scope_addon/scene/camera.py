@@ -34,10 +34,11 @@ from ..arrays import Float64Array
 from ..errors import VideoError
 from ..exif import picture_view
 from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from, picture_slots
+from ..kinematics.smoothing import continuous_quaternions
 from ..motion import Motion
 from ..notices import Notice, notice
 from .actions import Channels, fcurves_of
-from .character.animation import on_one_hemisphere
+from .datablocks import action_of
 from .stored_values import stored_numbers
 from .timing import rows_of_scene_frames
 
@@ -110,7 +111,7 @@ def build_camera(
     obj.location = locations[0]
     obj.rotation_quaternion = quaternion_from_matrix(T_world_blendcam[0, :3, :3])
     if np.ptp(T_world_blendcam, axis=0).max() > 1e-6:
-        rotations = on_one_hemisphere(quaternion_from_matrix(T_world_blendcam[:, :3, :3]))
+        rotations = continuous_quaternions(T_world_blendcam[:, :3, :3])
         channels = Channels(obj, bpy.data.actions.new(name))
         channels.write("location", frames, locations, group="Object Transforms")
         channels.write("rotation_quaternion", frames, rotations, group="Object Transforms")
@@ -312,7 +313,7 @@ def show_footage_again(
         return []
     opacity = former.alpha
     visible = former.show_background_image
-    action = camera.data.animation_data.action if camera.data.animation_data else None
+    action = action_of(camera.data)
     if action is not None:
         Channels.of(camera.data).remove({_shown_frames_path(0)})
         if not fcurves_of(action):
@@ -334,8 +335,7 @@ def _frames_by_time(motion: Motion, clip: bpy.types.MovieClip) -> Float64Array:
     """Return the frame (T,) of a video that each pose was seen in, as Blender counts: by the time
     and the video's rate, so that frames which the file lacks count, too.
     """
-    counted: Float64Array = motion.footage_times_s * clip.fps
-    return counted
+    return motion.footage_times_s * clip.fps
 
 
 def _start(shown: Float64Array, frames: Float64Array) -> int:

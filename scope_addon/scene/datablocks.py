@@ -80,6 +80,18 @@ def is_part(block: bpy.types.ID) -> bool:
     return PART_TAG in block
 
 
+def action_of(block: bpy.types.ID) -> bpy.types.Action | None:
+    """Return the action that animates a datablock; None without one."""
+    animation = getattr(block, "animation_data", None)
+    return animation.action if animation is not None else None
+
+
+def with_data(obj: bpy.types.Object) -> list[bpy.types.ID]:
+    """Return an object, its data and the shape keys of that, as far as it has them."""
+    found = [obj, obj.data, getattr(obj.data, "shape_keys", None)]
+    return [block for block in found if block is not None]
+
+
 def shape_keys_of(armature: bpy.types.Object) -> list[bpy.types.Key]:
     """Return the shape keys of the meshes below an armature, each once."""
     meshes = [obj.data for obj in armature.children_recursive if obj.type == "MESH"]

@@ -37,6 +37,7 @@ from .actions import (
     used_slot,
 )
 from .character.expression_keys import MOVES, has_expression_keys
+from .datablocks import action_of
 from .rig_action import (
     channel_of_rotation,
     leave_tweak_mode,
@@ -180,7 +181,7 @@ def _write(
     source: str,
 ) -> tuple[bpy.types.Action, bpy.types.Action | None]:
     """Write the keys of one mesh; return the new action and the former one."""
-    former = keys.animation_data.action if keys.animation_data else None
+    former = action_of(keys)
     channels = Channels(keys, bpy.data.actions.new("Face"))
     for key, column in values.items():
         block = keys.key_blocks[key]
@@ -243,7 +244,7 @@ def retarget_face_bones(
     keys = face_keys(captured, rig, expression_map)
     leave_tweak_mode(rig)  # first: a failure would assign the strip's action
     with all_or_nothing(bpy.context.scene, rig):
-        former = rig.animation_data.action if rig.animation_data else None
+        former = action_of(rig)
         if former is None:
             Channels(rig, bpy.data.actions.new(rig.name))
         else:

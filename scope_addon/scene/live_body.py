@@ -20,7 +20,7 @@ import numpy as np
 from ...solver.body import Body
 from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
 from ..arrays import Float64Array, FloatArray
-from ..kinematics.axes import R_WORLD_MODEL
+from ..kinematics.axes import R_WORLD_MODEL, rotated, transposed
 from .character import armature, body_mesh
 from .character.animation import quaternion_product
 from .datablocks import NewDatablocks, found, remove, scene_of
@@ -160,12 +160,12 @@ class LiveBody:
         self._shown = rotations, pelvis
         values = rotations.copy()
         values[0] = quaternion_product(_Q_MODEL_WORLD, rotations[0])
-        C = np.swapaxes(self._M, 1, 2) @ R_WORLD_MODEL
-        values[:, 1:] = np.einsum("kij,kj->ki", C, values[:, 1:])
+        C = transposed(self._M) @ R_WORLD_MODEL
+        values[:, 1:] = rotated(C, values[:, 1:])
         offsets = (self._body.rest_joints(self._betas) - self._rest_joints) @ R_WORLD_MODEL.T
         turned = matrix_from_quaternion(rotations) @ R_WORLD_MODEL.T
         turned[1:] = R_WORLD_MODEL @ turned[1:]
-        moved = offsets - np.einsum("kij,kj->ki", turned, offsets)
-        locations = np.einsum("kji,kj->ki", self._M, moved)
+        moved = offsets - rotated(turned, offsets)
+        locations = rotated(transposed(self._M), moved)
         locations[0] = pelvis - turned[0] @ offsets[0] - self._head
         return values, locations

@@ -18,6 +18,7 @@ from ...solver.body import Body
 from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
 from ..arrays import Float64Array, FloatArray
 from ..edit.clip import Clip
+from ..kinematics.axes import transform_points
 from ..retarget.bone_map import BoneMap
 from ..retarget.skeleton import basis
 from ..retarget.transfer import Transfer
@@ -113,7 +114,7 @@ class LiveRig:
         heads = pose.heads[:, self._root] + self._options.offset
         if self._options.root == "in-place":
             heads[:, :2] = self._rest[:2]
-        heads = heads @ self._inverse[:3, :3].T + self._inverse[:3, 3]
+        heads = transform_points(self._inverse, heads)
         turns = basis(self._skeleton, self._turn @ pose.rotations)[0]
         self._write(rig, turns, (heads[0] - self._rest) @ self._location)
 

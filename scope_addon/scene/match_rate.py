@@ -31,7 +31,7 @@ from .datablocks import MARKERS, captures_of, holds, shape_keys_of
 from .face_retarget import faces_of
 from .rig_action import is_retargeted, retime_written_keys
 from .stored_values import FrameSpan, parse_spans, source_of, start_frame, stored_text
-from .timing import Retiming, action_strips, retime_keys, retime_strip
+from .timing import Retiming, action_strips, played_actions, retime_keys, retime_strip
 
 _MARKER = re.compile(rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) (\S+)")
 
@@ -78,7 +78,7 @@ def change_rate(
             _retime(camera, moves[here[0]], done)
             _retime(camera.data, moves[here[0]], done)  # Its lens may zoom.
     _retime_markers(scene, own, moves)
-    current = scene.frame_current + scene.frame_subframe
+    current = scene.frame_float
     first = next(iter(moves.values()), Retiming(0.0, 1.0))
     timing.set_scene_rate(scene, rate)
     for person, retiming in moves.items():
@@ -134,7 +134,7 @@ def _retime(datablock: bpy.types.ID, retiming: Retiming, done: _Done) -> None:
     animation = datablock.animation_data
     if animation is None:
         return
-    strips = action_strips(animation)
+    strips = action_strips(datablock)
     for strip in strips:
         retime_strip(strip, retiming)
     for user in [animation, *strips]:
@@ -166,9 +166,9 @@ def _retime_faces(
     moved = {keys for person in people for keys in _datablocks(person)}
     for face in faces_of(scene.objects):
         keys = face.data.shape_keys
-        if keys in moved or keys.library is not None or keys.animation_data is None:
+        if keys in moved or keys.library is not None:
             continue
-        for strip in action_strips(keys.animation_data):
+        for strip in action_strips(keys):
             if _is_written_here(strip.action) and source_of(strip.action) in sources:
                 retime_strip(strip, sources[source_of(strip.action)])
 
@@ -201,14 +201,10 @@ def _retime_rig(
     :param retiming: of the capture that the rig was retargeted to last.
     :param sources: of every capture, by the name of its armature.
     """
-    animation = rig.animation_data
-    if animation is None:
-        return
-    strips = [strip for strip in action_strips(animation) if _is_written_here(strip.action)]
-    for strip in strips:
-        retime_strip(strip, sources.get(source_of(strip.action), retiming))
-    actions = [animation.action, *(strip.action for strip in strips)]
-    written = {action for action in actions if action is not None and _is_written_here(action)}
+    for strip in action_strips(rig):
+        if _is_written_here(strip.action):
+            retime_strip(strip, sources.get(source_of(strip.action), retiming))
+    written = {action for action in played_actions(rig) if _is_written_here(action)}
     moved = {action for action in written if (action, _ALL_SLOTS) not in done}
     for action in moved:
         done.add((action, _ALL_SLOTS))

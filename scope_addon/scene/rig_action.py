@@ -10,11 +10,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...solver.rotations import quaternion_from_matrix
 from ..arrays import Float64Array
+from ..kinematics.smoothing import continuous_quaternions
 from ..retarget.skeleton import BoneMotion, Skeleton
 from .actions import Channels, bone_path, fcurves_of, nla_strips, read_keys
-from .character.animation import on_one_hemisphere
 from .stored_values import KEYS_OF, source_of
 from .timing import Retiming, retime_keys
 
@@ -185,9 +184,9 @@ def channel_of_rotation(mode: str, R: Float64Array) -> tuple[str, Float64Array]:
     mode.
     """
     if mode == "QUATERNION":
-        return "rotation_quaternion", on_one_hemisphere(quaternion_from_matrix(R))
+        return "rotation_quaternion", continuous_quaternions(R)
     if mode == "AXIS_ANGLE":
-        q = on_one_hemisphere(quaternion_from_matrix(R))
+        q = continuous_quaternions(R)
         size = np.linalg.norm(q[:, 1:], axis=1, keepdims=True)
         axis = np.where(size > 1e-9, q[:, 1:] / np.maximum(size, 1e-9), [0.0, 1.0, 0.0])
         return "rotation_axis_angle", np.concatenate([2 * np.arctan2(size, q[:, :1]), axis], axis=1)

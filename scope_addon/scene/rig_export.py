@@ -19,7 +19,7 @@ from ..output_paths import check_output
 from ..retarget.expression_map import ExpressionMap
 from ..retarget.rig_source import RigSource
 from .build import BuildOptions, build_scene
-from .datablocks import temporary_datablocks
+from .datablocks import action_of, temporary_datablocks
 from .export.export import ExportOptions, export
 from .export.export_states import temporary_scene
 from .face_retarget import (
@@ -137,7 +137,7 @@ def export_rig(path: Path, rig: bpy.types.Object, options: ExportOptions) -> lis
     :raises UsageError: when the suffix is unknown.
     :raises OutputError: when a file cannot be written.
     """
-    action = rig.animation_data.action if rig.animation_data else None
+    action = action_of(rig)
     unit = bpy.context.scene.unit_settings.scale_length
     options = replace(
         options, take=options.take or (action.name if action else rig.name), unit=unit

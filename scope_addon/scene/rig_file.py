@@ -18,11 +18,12 @@ from ..retarget.bone_map import PHALANGES, BoneMap, check_bone_count
 from ..retarget.guess import from_humanoid
 from ..retarget.rig_source import RigSource, files_beside_gltf
 from .actions import fcurves_of, shape_key_path
-from .datablocks import is_deformed_by, temporary_datablocks
+from .datablocks import is_deformed_by, temporary_datablocks, with_data
 from .export import formats
 from .export.export_states import temporary_scene
 from .rig_probe import at_rest, probe
 from .rig_retarget import usable_guess
+from .timing import played_actions
 
 
 def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.Object:
@@ -226,18 +227,16 @@ def _remove_animation(obj: bpy.types.Object) -> None:
     """Remove the actions and NLA of an object, its data and its shape keys, of which those that
     moved go back to 0; drivers are kept.
     """
-    keys = getattr(obj.data, "shape_keys", None)
-    for datablock in filter(None, (obj, obj.data, keys)):
+    for datablock in with_data(obj):
         animation = datablock.animation_data
         if animation is None:
             continue
-        strips = [strip for track in animation.nla_tracks for strip in track.strips]
-        played = {animation.action, *(strip.action for strip in strips)} - {None}
+        played = played_actions(datablock)
         animation.action = None
         for track in list(animation.nla_tracks):
             animation.nla_tracks.remove(track)
-        if datablock == keys:
+        if isinstance(datablock, bpy.types.Key):
             moved = {curve.data_path for action in played for curve in fcurves_of(action)}
-            for block in keys.key_blocks:
+            for block in datablock.key_blocks:
                 if shape_key_path(block.name) in moved:
                     block.value = 0.0

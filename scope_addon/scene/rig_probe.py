@@ -20,6 +20,7 @@ from mathutils import Matrix, Quaternion
 from ...solver.errors import InputError
 from ...solver.rotations import log
 from ..arrays import BoolArray, Float64Array, IndexArray
+from ..kinematics.axes import transform_points, transposed, unscaled
 from ..notices import Notice, notice
 from ..retarget.bone_map import PHALANGES, check_bone_count
 from ..retarget.fingers import bone_ends
@@ -90,7 +91,7 @@ def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
         carriers,
         matrices[:, :3, 3],
         bone_ends(whole, ordered, parts),
-        _rotations(matrices),
+        unscaled(matrices[:, :3, :3]),
         _floor(rig, whole, parts),
     )
 
@@ -141,7 +142,7 @@ def _dependencies(
             turn = Quaternion((0.6, 0.48, 0.64), 0.5 + 0.15 * k)
             rig.pose.bones[names[a]].matrix_basis = turn.to_matrix().to_4x4()
         posed = armature_from_world @ _matrices(rig, names)
-        turned = _rotations(posed) @ np.swapaxes(_rotations(rest), 1, 2)
+        turned = unscaled(posed[:, :3, :3]) @ transposed(unscaled(rest[:, :3, :3]))
         _check_rotated(rig, [names[a] for a in group], turned[group])
         for a in group:
             rig.pose.bones[names[a]].matrix_basis = Matrix()
@@ -264,7 +265,7 @@ def blocked_bones(
         for key in keys:
             rig.pose.bones[key.bone].matrix_basis = basis_of(key, t)
         seen = _matrices(rig, names)
-        cosine = (np.einsum("bij,bij->b", _rotations(seen), wanted[t]) - 1) / 2
+        cosine = (np.einsum("bij,bij->b", unscaled(seen[:, :3, :3]), wanted[t]) - 1) / 2
         off = np.maximum(off, np.arccos(np.clip(cosine, -1, 1)))
         size = np.ptp(seen[:, :3, 3], axis=0).max()
         shift = max(shift, np.linalg.norm(seen[root, :3, 3] - heads[t]) / size)
@@ -370,13 +371,6 @@ def _matrices(rig: bpy.types.Object, names: list[str]) -> Float64Array:
     return np.array([posed.matrix_world @ posed.pose.bones[name].matrix for name in names], float)
 
 
-def _rotations(matrices: Float64Array) -> Float64Array:
-    """Return the rotations (B, 3, 3) of matrices (B, 4, 4), without scale."""
-    U, _, Vt = np.linalg.svd(matrices[:, :3, :3])
-    rotations: Float64Array = U @ Vt
-    return rotations
-
-
 @contextmanager
 def at_rest(rig: bpy.types.Object) -> Iterator[None]:
     """Evaluate the rig without animation, pose and root object, with limbs switched to FK, inside
@@ -439,8 +433,8 @@ def rest_pose(rig: bpy.types.Object, *, with_skin: bool = False) -> RestPose:
     row = {name: index for index, name in enumerate(names)}
     parents = np.array([row[bone.parent.name] if bone.parent else -1 for bone in bones], int)
     matrix = np.array(rig.matrix_world, float)
-    heads = _placed(np.array([bone.head_local for bone in bones], float), matrix)
-    tails = _placed(np.array([bone.tail_local for bone in bones], float), matrix)
+    heads = transform_points(matrix, np.array([bone.head_local for bone in bones], float))
+    tails = transform_points(matrix, np.array([bone.tail_local for bone in bones], float))
     if not with_skin:
         return RestPose(names, parents, heads, tails)
     bpy.context.view_layer.update()  # Rigid parts follow bones that were just posed.
@@ -452,15 +446,9 @@ def rest_pose(rig: bpy.types.Object, *, with_skin: bool = False) -> RestPose:
             mesh.data.vertices.foreach_get("co", of_mesh)
             # Mesh and rig may move with a common parent: what counts is how one lies in the other.
             here = matrix @ np.array(rig.matrix_world.inverted_safe() @ mesh.matrix_world, float)
-            points.append(_placed(of_mesh.reshape(-1, 3).astype(float), here)[owned >= 0])
+            points.append(transform_points(here, of_mesh.reshape(-1, 3).astype(float))[owned >= 0])
             owners.append(owned[owned >= 0])
     return RestPose(names, parents, heads, tails, np.concatenate(points), np.concatenate(owners))
-
-
-def _placed(points: Float64Array, matrix: Float64Array) -> Float64Array:
-    """Return points (n, 3) under a matrix (4, 4)."""
-    placed: Float64Array = points @ matrix[:3, :3].T + matrix[:3, 3]
-    return placed
 
 
 def _owners(

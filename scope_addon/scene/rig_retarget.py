@@ -17,6 +17,7 @@ from ..arrays import Float64Array, FloatArray
 from ..edit.clip import Clip
 from ..edit.root_motion import about_z, floor_trajectory
 from ..errors import UsageError
+from ..kinematics.axes import rotated, transposed
 from ..notices import PHRASES, Notice, notice
 from ..retarget.bone_map import PHALANGES, SPINE, BoneMap
 from ..retarget.expression_map import ExpressionMap
@@ -38,6 +39,7 @@ from .character.root_object import (
     root_object,
     topmost,
 )
+from .datablocks import action_of
 from .face_retarget import captured_expressions, face_keys, key_face, rest_face
 from .packed_motion import apart_at_cuts
 from .rig_action import (
@@ -238,7 +240,7 @@ def retarget(
             warnings += blocked_bones(rig, keys, motion.rotations, motion.heads)
             keys += ik_keys(rig, keys)
         warnings += posed_bones(rig, skeleton.names)
-        former = rig.animation_data.action if rig.animation_data else None
+        former = action_of(rig)
         action = write_action(rig, keys, frames, source.name)
         if face is not None:
             key_face(rig, face, source.name)
@@ -343,8 +345,8 @@ def _placed(
         angles = floor_trajectory(clip)[1] + yaw + pose.facing
         turn = about_z(angles)
         origin = place[:3, 3] * [1.0, 1.0, 0.0]
-        rotations = np.swapaxes(turn, 1, 2)[:, None] @ rotations
-        heads = np.einsum("tji,tj->ti", turn, heads - positions) + origin
+        rotations = transposed(turn)[:, None] @ rotations
+        heads = rotated(transposed(turn), heads - positions) + origin
         return _PlacedMotion(rotations, heads, (positions - turn @ origin, angles))
     return _PlacedMotion(rotations, heads)
 
@@ -364,7 +366,7 @@ def _with_source_transform(
     position = np.array([tuple(part[0]) for part in parts])
     R = np.array([part[1].to_matrix() for part in parts])
     angles = np.unwrap([part[1].to_euler("ZYX").z for part in parts])
-    return R[:, None] @ rotations, (R @ heads[..., None])[..., 0] + position, angles
+    return R[:, None] @ rotations, rotated(R, heads) + position, angles
 
 
 def _back_above_root_object(rig: bpy.types.Object, frames: Float64Array) -> Float64Array:
@@ -414,7 +416,7 @@ def _moved_back(motion: _PlacedMotion, back: Float64Array) -> _PlacedMotion:
     :param back: (T, 4, 4) or (1, 4, 4), from `_back`; it may scale.
     """
     R = np.array([Matrix(each.tolist()).decompose()[1].to_matrix() for each in back])
-    heads = (back[:, :3, :3] @ motion.heads[..., None])[..., 0] + back[:, :3, 3]
+    heads = rotated(back[:, :3, :3], motion.heads) + back[:, :3, 3]
     return replace(motion, rotations=R[:, None] @ motion.rotations, heads=heads)
 
 

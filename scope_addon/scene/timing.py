@@ -21,6 +21,7 @@ import numpy as np
 
 from ..arrays import Float64Array, FloatArray, IndexArray
 from ..errors import MotionFileError, UsageError
+from .datablocks import action_of
 from .stored_values import LAST_FRAME, RATE, RATES, stored_rate, stored_text
 
 # Rates within this tolerance (frames per second) of a standard one are taken to be it: 23.98 is 24
@@ -261,11 +262,18 @@ def retime_keys(curves: Iterable[bpy.types.FCurve], retiming: Retiming) -> None:
         curve.update()
 
 
-def action_strips(animation: bpy.types.AnimData) -> list[bpy.types.NlaStrip]:
+def action_strips(block: bpy.types.ID) -> list[bpy.types.NlaStrip]:
     """Return the NLA strips of a datablock that play an action."""
-    return [
-        s for track in animation.nla_tracks for s in track.strips if s.type == "CLIP" and s.action
-    ]
+    animation = getattr(block, "animation_data", None)
+    tracks = animation.nla_tracks if animation is not None else ()
+    return [s for track in tracks for s in track.strips if s.type == "CLIP" and s.action]
+
+
+def played_actions(block: bpy.types.ID) -> list[bpy.types.Action]:
+    """Return the actions that animate a datablock: its own, and those of its NLA strips."""
+    own = action_of(block)
+    strips = [strip.action for strip in action_strips(block)]
+    return strips if own is None else [own, *strips]
 
 
 def retime_strip(strip: bpy.types.NlaStrip, retiming: Retiming) -> None:

@@ -26,7 +26,7 @@ from .actions import (
     write_modifiers,
     write_whole_keys,
 )
-from .datablocks import NewDatablocks, enter_object_mode
+from .datablocks import NewDatablocks, action_of, enter_object_mode
 from .timing import action_strips, set_strip_ends, strip_ends
 
 _SCENE = ("frame_start", "frame_end", "frame_preview_start", "frame_preview_end", "camera")
@@ -184,10 +184,10 @@ class _SavedAnimation:
         self._obj = obj
         data = obj.animation_data
         self._had_data = data is not None
-        self._action: bpy.types.Action | None = data.action if data else None
+        self._action = action_of(obj)
         self._slot = used_slot(data)
         self._content = _SavedAction(self._action) if self._action else None
-        self._strips = [(s, strip_ends(s)) for s in action_strips(data)] if data else []
+        self._strips = [(s, strip_ends(s)) for s in action_strips(obj)]
 
     def restore(self) -> None:
         """Restore the action as it was, for every object that it animates."""

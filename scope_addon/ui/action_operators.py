@@ -10,7 +10,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from ...solver.errors import ScopeError
 from ..errors import UsageError
-from ..scene.datablocks import NAME_TAG, SOURCE_TAG, short_name
+from ..scene.datablocks import NAME_TAG, SOURCE_TAG, action_of, short_name, with_data
 from ..scene.stored_values import start_frame, stored_text
 from . import comparison
 from .captured_person import captured_armature, motion_of, stored_person
@@ -46,7 +46,7 @@ class ActionOperator(ReportingOperator):
                 name=armature.name,
                 file=file,
             )
-        if armature.animation_data is None or armature.animation_data.action is None:
+        if action_of(armature) is None:
             name = armature.name
             return refuse(cls, "'{name}' has no action; choose one in the Action Editor", name=name)
         return True
@@ -114,8 +114,7 @@ class SCOPE_OT_rename_take(CaptureOperator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask for the name."""
         self.name = context.scene.scope.result.collection.name
-        outcome: set[str] = context.window_manager.invoke_props_dialog(self)
-        return outcome
+        return context.window_manager.invoke_props_dialog(self)
 
     def draw(self, _context: bpy.types.Context) -> None:
         """Draw the name, which is typed over at once."""
@@ -171,16 +170,8 @@ def _rename(collection: bpy.types.Collection, name: str) -> None:
         for obj in collection.all_objects
         if obj.type == "ARMATURE" and obj.library is None
     }
-    blocks: list[bpy.types.ID] = []
-    for obj in collection.all_objects:
-        data = [obj, obj.data, getattr(obj.data, "shape_keys", None)]
-        blocks += [block for block in data if block is not None]
-        blocks += [
-            block.animation_data.action
-            for block in data
-            if block is not None and block.animation_data
-        ]
-    for block in dict.fromkeys(block for block in blocks if block is not None):
+    blocks = [block for obj in collection.all_objects for block in with_data(obj)]
+    for block in dict.fromkeys([*blocks, *filter(None, map(action_of, blocks))]):
         begins = next((each for each in former if block.name.startswith(each)), None)
         if block.library is None and begins is not None:
             block.name = name + block.name.removeprefix(begins)
@@ -240,8 +231,7 @@ class SCOPE_OT_mark_asset(ActionOperator):
             self.description_text = data.description
             paths = {uid: path for path, uid in catalogs().items()}
             self.catalog = paths.get(data.catalog_id, "")
-        outcome: set[str] = context.window_manager.invoke_props_dialog(self)
-        return outcome
+        return context.window_manager.invoke_props_dialog(self)
 
     def work(self, context: bpy.types.Context) -> str:
         """Mark the action and draw its picture.

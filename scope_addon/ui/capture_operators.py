@@ -450,8 +450,7 @@ def _folder_of_files(settings: Any) -> str:
     """Return the folder for the files of the list's clips; empty if none is chosen."""
     if settings.queue_folder.startswith("//") and not bpy.data.filepath:
         return ""  # relative to a .blend file that was never saved
-    folder: str = bpy.path.abspath(settings.queue_folder)
-    return folder
+    return bpy.path.abspath(settings.queue_folder)
 
 
 def _scene_of_job() -> bpy.types.Scene | None:

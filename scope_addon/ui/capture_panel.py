@@ -582,8 +582,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
     def result(self) -> SCOPE_PG_result:
         """Result of the capture that is selected in the list; empty in a scene without captures."""
         capture = shown_capture(self.id_data)
-        result: SCOPE_PG_result = capture.scope_result if capture else self.no_result
-        return result
+        return capture.scope_result if capture else self.no_result
 
 
 def attach() -> None:

@@ -12,7 +12,7 @@ from bpy.props import IntProperty
 
 from ...solver.errors import ScopeError
 from ..errors import UsageError
-from ..scene.datablocks import holds, is_person
+from ..scene.datablocks import action_of, holds, is_person
 from ..scene.stored_values import source_of, stored_numbers, stored_text
 from .reporting import ReportingOperator, refuse
 
@@ -57,8 +57,7 @@ def stored_person(rig: bpy.types.Object) -> bpy.types.Object | None:
     """
     stored = rig.get(PERSON)
     person = stored if isinstance(stored, bpy.types.Object) else None
-    animation = rig.animation_data
-    action = animation.action if animation is not None else None
+    action = action_of(rig)
     if rig.override_library is None or action is None or action.library is not None:
         return person
     name = source_of(action)
@@ -105,8 +104,7 @@ def library_of(armature: bpy.types.Object) -> bpy.types.Library | None:
     """Return the library that the armature or its action is linked from, overridden or not; None if
     both are local.
     """
-    blocks = [armature, armature.animation_data.action if armature.animation_data else None]
-    for block in filter(None, blocks):
+    for block in filter(None, (armature, action_of(armature))):
         original = block.override_library.reference if block.override_library else block
         if original is not None and original.library is not None:
             return original.library
@@ -267,8 +265,7 @@ class SpanOperator(EditOperator):
             self.end = scene.frame_preview_end
         else:
             self.start, self.end = self.default_span(scene)
-        outcome: set[str] = context.window_manager.invoke_props_dialog(self)
-        return outcome
+        return context.window_manager.invoke_props_dialog(self)
 
     def work(self, context: bpy.types.Context) -> str:
         """Edit the keys within the span.

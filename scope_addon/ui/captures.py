@@ -14,7 +14,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..notices import notice
-from ..scene.datablocks import captures_of, is_in_layer, is_person
+from ..scene.datablocks import captures_of, is_in_layer, is_person, with_data
 from .captured_person import captured_armature
 from .reporting import iface_, sentence, tip_
 
@@ -39,8 +39,7 @@ def shown_capture(scene: bpy.types.Scene) -> bpy.types.Collection | None:
     """
     found = captures_of(scene)
     if scene.scope.capture in found:
-        chosen: bpy.types.Collection = scene.scope.capture
-        return chosen
+        return scene.scope.capture
     return found[-1] if found else None
 
 
@@ -82,8 +81,8 @@ def _evaluate_animation(capture: bpy.types.Collection) -> None:
     the pose from before the capture was hidden until the frame changes.
     """
     for obj in capture.all_objects:
-        for block in (obj, obj.data, getattr(obj.data, "shape_keys", None)):
-            if block is not None and block.library is None:
+        for block in with_data(obj):
+            if block.library is None:
                 block.update_tag(refresh={"TIME"})
 
 

@@ -408,6 +408,7 @@ def _pelvis_path(armature: bpy.types.Object, rate: float) -> Float64Array | None
     """Return the scene frame and the world position of the pelvis at every key, (T, 4); None
     without keys.
     """
+    from ..kinematics.axes import transform_points
     from ..scene.character.keys import read_clip
     from ..scene.character.root_object import clip_as_displayed, parent_transform, root_object
 
@@ -420,9 +421,8 @@ def _pelvis_path(armature: bpy.types.Object, rate: float) -> Float64Array | None
     if empty is not None:  # whose transform is in the clip, in the armature's units
         size = armature.matrix_basis.median_scale
         M = np.array(parent_transform(empty) @ Matrix.Scale(size, 4))
-    return np.column_stack(
-        [frames, clip_as_displayed(armature, clip, frames).root @ M[:3, :3].T + M[:3, 3]]
-    )
+    shown = clip_as_displayed(armature, clip, frames)
+    return np.column_stack([frames, transform_points(M, shown.root)])
 
 
 def attach() -> None:

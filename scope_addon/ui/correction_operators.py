@@ -186,9 +186,7 @@ def shown_frame(scene: bpy.types.Scene, armature: bpy.types.Object, motion: Moti
     from ..scene.character.corrected_keys import source_frame
     from ..scene.timing import keyed_rate
 
-    return source_frame(
-        armature, motion, scene.frame_current + scene.frame_subframe, keyed_rate(armature, scene)
-    )
+    return source_frame(armature, motion, scene.frame_float, keyed_rate(armature, scene))
 
 
 _RESTS_M = 0.02  # from the floor, within which what shall rest there does
@@ -317,7 +315,7 @@ class SCOPE_OT_add_pin(EditOperator):
 
         scene = context.scene
         context.view_layer.update()
-        current = scene.frame_current + scene.frame_subframe
+        current = scene.frame_float
         frame = shown_frame(scene, armature, motion)
         points = [np.array(self.location, float)]
         if self.in_image and scene.camera is not None:

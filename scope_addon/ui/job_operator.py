@@ -58,8 +58,7 @@ class JobOperator(bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Start from the panel, and continue on a timer."""
         if bpy.app.background:
-            outcome: set[str] = self.execute(context)
-            return outcome
+            return self.execute(context)
         if not self.start(context):
             return {"CANCELLED"}
         manager = context.window_manager

@@ -111,7 +111,7 @@ class SCOPE_OT_set_upright_in_view(CorrectionOperator):
         motion = motion_of(armature)
         points = np.array([self.start, self.end, self.start])
         points[2] += self.direction
-        current = scene.frame_current + scene.frame_subframe
+        current = scene.frame_float
         start, end, beyond = captured_points(armature, current, points)
         transform = upright_transform_in_view(motion, body, (start, end), beyond - start)
         _set_upright(scene, armature, motion, transform)
@@ -274,7 +274,7 @@ def _pixels(context: bpy.types.Context, points: list[object]) -> list[tuple[floa
     if armature is None:  # since the line was begun
         raise UsageError("the captured person was removed; select another one")
     motion = motion_of(armature)
-    current = scene.frame_current + scene.frame_subframe
+    current = scene.frame_float
     frame = shown_frame(scene, armature, motion)
     at = captured_points(armature, current, np.array(points, float))
     u, v = (shot_of(motion).project(frame, point) for point in at)

@@ -60,7 +60,7 @@ def test_strips_move_with_the_part_that_they_play(moved: bpy.types.Object, facto
     strip.action_frame_end = 8.0
     strip.frame_start_raw = 21.0
     strip.frame_end_raw = 27.0
-    (strip,) = action_strips(animation)
+    (strip,) = action_strips(moved)
     assert strip.action == action
     retime_strip(strip, Retiming(1.0, factor))
     ends = strip.frame_start, strip.frame_end, strip.action_frame_start, strip.action_frame_end

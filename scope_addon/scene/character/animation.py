@@ -19,7 +19,8 @@ import numpy as np
 from ....solver.body import Body
 from ....solver.rotations import quaternion_from_matrix
 from ...arrays import Float64Array
-from ...kinematics.axes import R_WORLD_MODEL
+from ...kinematics.axes import R_WORLD_MODEL, transposed
+from ...kinematics.smoothing import on_one_hemisphere
 from ...motion import Motion
 from ..actions import Channels, bone_path
 from .armature import RestPose, rest_orientations
@@ -47,23 +48,6 @@ def quaternion_product(a: Float64Array, b: Float64Array) -> Float64Array:
     return np.stack([w, x, y, z], axis=-1)
 
 
-def on_one_hemisphere(quaternions: Float64Array) -> Float64Array:
-    """Choose the signs of quaternions so that consecutive ones are on one hemisphere; q and −q are
-    equal rotations.
-
-    Blender interpolates the four components separately: a change of sign would make the bone spin
-    between two keys.
-
-    :param quaternions: (T, ..., 4).
-    :return: (T, ..., 4).
-    """
-    agrees = (quaternions[1:] * quaternions[:-1]).sum(axis=-1) >= 0
-    sign = np.cumprod(np.where(agrees, 1.0, -1.0), axis=0)
-    out = quaternions.copy()
-    out[1:] *= sign[..., None]
-    return out
-
-
 def pose_channels(
     body: Body, motion: Motion, rest: RestPose, M: Float64Array
 ) -> tuple[Float64Array, Float64Array]:
@@ -74,7 +58,7 @@ def pose_channels(
         axes.
     """
     w = motion.poses.reshape(len(motion), -1, 3).astype(float)
-    C = np.swapaxes(M, 1, 2) @ R_WORLD_MODEL
+    C = transposed(M) @ R_WORLD_MODEL
     rotations = quaternion_from_rotation_vector(np.einsum("kij,tkj->tki", C, w))
     turned = quaternion_product(
         quaternion_from_matrix(R_WORLD_MODEL.T), quaternion_from_rotation_vector(w[:, 0])

@@ -22,7 +22,7 @@ import numpy as np
 
 from ....solver.body import Body
 from ...arrays import Float64Array, FloatArray
-from ...kinematics.axes import R_WORLD_MODEL, UP
+from ...kinematics.axes import R_WORLD_MODEL, UP, unscaled
 from ..datablocks import enter_object_mode
 
 SHORTEST_BONE = 0.02  # metres; Blender deletes bones of zero length
@@ -124,10 +124,9 @@ def rest_orientations(armature: bpy.types.Object, body: Body) -> Float64Array:
     orthonormalized.
     """
     bones = armature.data.bones
-    M = np.array([np.array(bones[name].matrix_local)[:3, :3] for name in body.joint_names], float)
-    U, _, Vt = np.linalg.svd(M)
-    M_i: Float64Array = U @ Vt
-    return M_i
+    return unscaled(
+        np.array([bones[name].matrix_local.to_3x3() for name in body.joint_names], float)
+    )
 
 
 def side_of(joint_name: str) -> str:

@@ -74,8 +74,7 @@ def rest_vertices_world(
     :param betas: (P,) shape coefficients; None for the mean shape.
     :return: (V, 3) metres, z up.
     """
-    vertices: Float64Array = body.rest_vertices(betas) @ R_WORLD_MODEL.T + lift
-    return vertices
+    return body.rest_vertices(betas) @ R_WORLD_MODEL.T + lift
 
 
 def skin_to_armature(mesh: bpy.types.Object, armature: bpy.types.Object, body: Body) -> None:

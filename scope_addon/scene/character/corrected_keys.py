@@ -37,7 +37,7 @@ from ...edit.root_motion import relative_to_trajectory, with_trajectory
 from ...edit.smooth import smoothed
 from ...edit.solve_pins import Shot, missed, resolve
 from ...errors import UsageError
-from ...kinematics.axes import UP
+from ...kinematics.axes import UP, rotated, transform_points, transposed
 from ...motion import Motion
 from ..actions import fcurves, read_keys
 from ..stored_values import smoothing_of, start_frame
@@ -221,7 +221,7 @@ def captured_points(
     metres.
     """
     inverse = np.array(world_matrix(armature).inverted_safe())
-    points = points_world @ inverse[:3, :3].T + inverse[:3, 3]
+    points = transform_points(inverse, points_world)
     n = len(points)
     still = Clip(np.zeros(n), np.tile(np.eye(3), (n, 1, 1, 1)), points)
     return clip_with_root_motion(armature, still, np.full(n, frame)).root
@@ -279,8 +279,7 @@ def _nearest_rows(motion: Motion, times: Float64Array) -> IndexArray:
     one, in spite of rounding.
     """
     distance = np.abs(motion.timestamps[:, None] - times)
-    nearest: IndexArray = (distance <= distance.min(axis=0) + _SAME_S).argmax(axis=0)
-    return nearest
+    return (distance <= distance.min(axis=0) + _SAME_S).argmax(axis=0)
 
 
 def _longest_shown(motion: Motion, rate: float) -> float:
@@ -439,9 +438,9 @@ def _write_change(
     old, new = change
     which = differ(old, new)
     changed = clip.copy()
-    inverse = np.swapaxes(old.rotations[which], -1, -2)
-    shift = (inverse[:, 0] @ (new.root - old.root)[which, :, None])[..., 0]
-    changed.root[which] += (clip.rotations[which, 0] @ shift[..., None])[..., 0]
+    inverse = transposed(old.rotations[which])
+    shift = rotated(inverse[:, 0], (new.root - old.root)[which])
+    changed.root[which] += rotated(clip.rotations[which, 0], shift)
     changed.rotations[which] = clip.rotations[which] @ inverse @ new.rotations[which]
     if moves is not None:
         changed, moved = _moved_rows(changed, moves)
@@ -453,13 +452,7 @@ def _moved_rows(clip: Clip, moves: Float64Array) -> tuple[Clip, BoolArray]:
     """Move each row in the world by its rigid transform (T, 4, 4); also return which rows (T,) that
     moves.
     """
-    out = clip.copy()
-    moved = (moves != np.eye(4)).any(axis=(1, 2))
-    out.rotations[moved, 0] = moves[moved, :3, :3] @ out.rotations[moved, 0]
-    out.root[moved] = (moves[moved, :3, :3] @ out.root[moved, :, None])[..., 0] + moves[
-        moved, :3, 3
-    ]
-    return out, moved
+    return moved_clip(clip, moves), (moves != np.eye(4)).any(axis=(1, 2))
 
 
 @dataclass(frozen=True)

@@ -19,11 +19,12 @@ import bpy
 import numpy as np
 
 from ....solver.body import Body
-from ....solver.rotations import matrix_from_quaternion, quaternion_from_matrix
+from ....solver.rotations import matrix_from_quaternion
 from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ...edit.clip import Clip, band_limited, sample
 from ...errors import UsageError
-from ...kinematics.axes import R_WORLD_MODEL
+from ...kinematics.axes import R_WORLD_MODEL, transposed
+from ...kinematics.smoothing import continuous_quaternions
 from ..actions import (
     bone_path,
     change_keys,
@@ -35,7 +36,6 @@ from ..actions import (
     values_between_keys,
 )
 from ..timing import whole_frames_of
-from .animation import on_one_hemisphere
 from .armature import rest_orientations
 
 ROTATION = "rotation_quaternion"
@@ -72,7 +72,7 @@ def read_clip_at(armature: bpy.types.Object, body: Body, rate: float, frames: Fl
     q = np.stack([values[bone_path(name, ROTATION)] for name in body.joint_names], axis=1)
     B = matrix_from_quaternion(q / np.maximum(np.linalg.norm(q, axis=-1, keepdims=True), 1e-9))
     C = _axes(armature, body)
-    rotations = np.swapaxes(C, 1, 2) @ B @ C
+    rotations = transposed(C) @ B @ C
     rotations[:, 0] = R_WORLD_MODEL @ rotations[:, 0]
     pelvis = values[location_path(body)] + _root_head(armature, body)
     return Clip(frames / rate, rotations, pelvis)
@@ -89,8 +89,8 @@ def channel_values(
     C = _axes(armature, body)
     rotations = clip.rotations.copy()
     rotations[:, 0] = R_WORLD_MODEL.T @ rotations[:, 0]
-    B = C @ rotations @ np.swapaxes(C, 1, 2)
-    return on_one_hemisphere(quaternion_from_matrix(B)), clip.root - _root_head(armature, body)
+    B = C @ rotations @ transposed(C)
+    return continuous_quaternions(B), clip.root - _root_head(armature, body)
 
 
 def write_clip(armature: bpy.types.Object, body: Body, clip: Clip, frames: Float64Array) -> None:
@@ -274,8 +274,7 @@ def _check_bones(armature: bpy.types.Object, body: Body) -> None:
 
 def _axes(armature: bpy.types.Object, body: Body) -> Float64Array:
     """Return C_i = M_iᵀ R_world_model (K+1, 3, 3)."""
-    axes: Float64Array = np.swapaxes(rest_orientations(armature, body), 1, 2) @ R_WORLD_MODEL
-    return axes
+    return transposed(rest_orientations(armature, body)) @ R_WORLD_MODEL
 
 
 def _kept_keys(
@@ -312,8 +311,7 @@ def _kept_keys(
 
 def _distances(p: Float64Array, wanted: Float64Array) -> Float64Array:
     """Return the distances (N,) between positions (N, 3)."""
-    distances: Float64Array = np.linalg.norm(p - wanted, axis=1)
-    return distances
+    return np.linalg.norm(p - wanted, axis=1)
 
 
 def angles_between(q: Float64Array, wanted: Float64Array) -> Float64Array:
@@ -326,5 +324,4 @@ def angles_between(q: Float64Array, wanted: Float64Array) -> Float64Array:
     """
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     chord = np.minimum(np.linalg.norm(q - wanted, axis=-1), np.linalg.norm(q + wanted, axis=-1))
-    angles: Float64Array = 4.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))
-    return angles
+    return 4.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))

@@ -28,7 +28,7 @@ from ..actions import (
     read_keys,
     used_slot,
 )
-from ..datablocks import remove_blocks
+from ..datablocks import action_of, remove_blocks
 from ..packed_motion import apart_at_cuts
 from ..stored_values import stored_numbers
 from ..timing import Retiming
@@ -394,7 +394,7 @@ def _copy_parenting(obj: bpy.types.Object, other: bpy.types.Object) -> None:
 def _remove_unless_parent(empty: bpy.types.Object) -> None:
     if empty.children:
         return
-    action = empty.animation_data.action if empty.animation_data else None
+    action = action_of(empty)
     remove_blocks([empty])
     if action is not None and action.users == 0:
         bpy.data.actions.remove(action)

@@ -10,9 +10,9 @@ import numpy as np
 from mathutils import Matrix, Quaternion
 
 from ...arrays import Float64Array
+from ...kinematics.smoothing import on_one_hemisphere
 from ..actions import fcurves, read_keys, rewrite_keys
 from ..visibility import world_matrix
-from .animation import on_one_hemisphere
 from .root_object import parent_transform
 
 # custom property of the camera: JSON of where it was before the first turn, and after the last

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...arrays import BoolArray, Float64Array
-from ...kinematics.axes import R_WORLD_MODEL
+from ...kinematics.axes import R_WORLD_MODEL, rotated, transposed
 
 # the format states no unit; most tools expect centimetres
 UNITS_PER_METRE = {"cm": 100.0, "m": 1.0}
@@ -139,10 +139,10 @@ def _at_parents(pose: SampledPose) -> tuple[Float64Array, Float64Array]:
     child = parents >= 0
     joints = pose.joints @ R_FILE_WORLD.T
     turned = R_FILE_WORLD @ pose.rotations @ R_FILE_WORLD.T
-    R_parent_file = np.swapaxes(turned[:, parents[child]], 2, 3)
+    R_parent_file = transposed(turned[:, parents[child]])
     apart = joints[:, child] - joints[:, parents[child]]
     places = joints.copy()
-    places[:, child] = (R_parent_file @ apart[..., None])[..., 0]
+    places[:, child] = rotated(R_parent_file, apart)
     local = turned.copy()
     local[:, child] = R_parent_file @ turned[:, child]
     return places, euler_zyx_degrees(local)

@@ -14,9 +14,9 @@ import numpy as np
 from mathutils import Matrix
 
 from ...errors import UsageError
+from ...kinematics.smoothing import on_one_hemisphere
 from .. import actions
 from ..camera import set_resolution
-from ..character.animation import on_one_hemisphere
 from ..character.body_mesh import mixed_vertices, shape_key_name
 from ..character.expression_keys import copy_expressions, expression_offsets
 from ..datablocks import changed, is_deformed_by

@@ -40,8 +40,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...arrays import Float64Array
 from ...errors import OutputError
+from ...kinematics.axes import transform_points, transposed, unscaled
 from .. import timing
 from ..capture_parts import cameras_in
 from ..character.root_object import parent_transform, root_object
@@ -221,14 +221,13 @@ def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.Sample
                 posed[row, column] = world @ np.array(evaluated.pose.bones[name].matrix)
     world = np.array(_place_at_rest(rig))
     rest_world = world @ rest
-    tails = np.array([world[:3, :3] @ np.array(bone.tail_local) + world[:3, 3] for bone in bones])
+    tails = transform_points(world, np.array([bone.tail_local for bone in bones]))
     return bvh.SampledPose(
         names=names,
         parents=[names.index(bone.parent.name) if bone.parent else -1 for bone in bones],
         heads=rest_world[:, :3, 3],
         tails=tails,
-        rotations=_unscaled(posed[..., :3, :3])
-        @ np.swapaxes(_unscaled(rest_world[:, :3, :3]), 1, 2),
+        rotations=unscaled(posed[..., :3, :3]) @ transposed(unscaled(rest_world[:, :3, :3])),
         joints=posed[..., :3, 3],
         rate=timing.scene_rate(scene),
     )
@@ -242,13 +241,6 @@ def _place_at_rest(rig: bpy.types.Object) -> Matrix:
     if empty is None:
         return rig.matrix_world
     return parent_transform(empty) @ empty.matrix_world.inverted_safe() @ rig.matrix_world
-
-
-def _unscaled(R: Float64Array) -> Float64Array:
-    """Return the nearest rotations (..., 3, 3) to matrices that may scale and shear."""
-    U, _, Vt = np.linalg.svd(R)
-    rotations: Float64Array = U @ Vt
-    return rotations
 
 
 class _NullStream(io.TextIOBase):

@@ -27,7 +27,7 @@ import numpy as np
 from ...arrays import BoolArray, Float64Array
 from ...atomic_write import write_result
 from ...footage import display_text
-from ...kinematics.axes import R_OPENSIM_MODEL, R_OPENSIM_WORLD
+from ...kinematics.axes import R_OPENSIM_MODEL, R_OPENSIM_WORLD, transposed
 from ...motion import Motion
 from ...output_paths import person_paths
 from ..budget import check_rows
@@ -305,7 +305,7 @@ def _between(
     R_first: Float64Array, R_second: Float64Array
 ) -> tuple[Float64Array, Float64Array, Float64Array]:
     """Return the angles of the joint between two segments, see `_angles`."""
-    return _angles(np.swapaxes(R_first, -1, -2) @ R_second)
+    return _angles(transposed(R_first) @ R_second)
 
 
 def _angles(
