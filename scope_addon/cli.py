@@ -11,11 +11,11 @@ import argparse
 import os
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn, TextIO
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 from ..solver.body_file import ASSETS
 from ..solver.errors import ScopeError
@@ -80,6 +80,9 @@ from .options.capture import OFF
 from .output_paths import SUFFIXES, WITHOUT_SCENE
 from .parent import end_with_parent
 from .private_folder import lasting_folder
+
+if TYPE_CHECKING:
+    from .report.capture_page import CapturedClip
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"
 PROGRAM = (sys.executable, "-m", str(__package__))
@@ -310,38 +313,16 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     """
     check_installed(CAPTURE)
     video = args.video or SAMPLE
-    if not args.video and not SAMPLE.is_file():
-        raise UsageError(
-            "the sample clip is only in the repository, not in this installation; "
-            "give a VIDEO to capture"
-        )
     outputs = distinct_paths(args.output) or default_outputs(video)
-    if args.save_calibration and (not args.views or args.mirror):
-        raise UsageError(
-            "--save-calibration is for several videos, given one after the other, without --mirror"
-        )
-    check_outputs(
-        outputs,
-        vars(args) | {"video": video},
-        args.overlay,
-        args.report,
-        args.save_calibration,
-    )
-    check_blender(outputs)
-    check_memory_limit(with_scene=any(path.suffix.lower() not in WITHOUT_SCENE for path in outputs))
+    _check_files(args, video, outputs)
     # A rig may be edited during the capture.
     captured_with = {name: value for name, value in vars(args).items() if name not in OF_RIGS}
     named = WatchedFiles(files_of_options(captured_with))
     body, options = body_and_options(args)
     options = with_window_seconds(options, args)
     # Imported here, so that --help and errors in the arguments are printed immediately.
-    from .capture.camera.calibration import write_calibration
-    from .capture.long_clips.windowed_clip import lasting
-    from .capture.overlay_video import write_overlay
-    from .capture.pipeline import capture
-    from .capture.several_views.capture_views import capture_views
-    from .job.unfinished import unfinished_capture
-    from .report.capture_page import CapturedClip, write_capture_page
+    from .job.watched_capture import watched_capture
+    from .report.capture_page import CapturedClip
 
     confine(args, outputs)
     rigs = checked_rigs(args, outputs, args.hands != OFF, args.face)
@@ -350,55 +331,22 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
         if not args.views and (found := window_report(args, video, options, progress)):
             return found
         rate_given = options.wanted.fps is not None
-        # What several cameras show is not continued after a kill.
-        folder = None if args.views else lasting_folder()
-        unfinished = stack.enter_context(unfinished_capture(folder, video, rate_given))
-        footage = unfinished.footage
-        views = [WatchedFootage(path, rate_given) for path in args.views]
-        watched = footage.watched(progress)
-        for view in views:
-            watched = view.watched(watched)
-        if args.views:
-            result = capture_views([video, *args.views], body, options, watched)
-        else:
-            observe_frames = lasting(unfinished.folder, args.windows_folder)
-            result = capture(video, body, options, watched, observe_frames=observe_frames)
-        named.check()
-        for each in (footage, *views):
-            each.check()
+        running = stack.enter_context(
+            watched_capture(lasting_folder(), video, args.views, named, rate_given)
+        )
+        result = running.run(body, options, progress, windows_folder=args.windows_folder)
         progress("writing", 0, 0)
         with interrupted("some results may have been written already, each of them complete"):
             placed = result.report.placed_videos(args.views)
             written, warnings = write_outputs(
                 outputs, result.motions, body, video, args, rigs, placed
             )
-            warnings = [*result.report.warnings, *unfinished.warnings, *warnings]
-            captured = replace(result.report, warnings=warnings)
-            if args.save_calibration:
-                write_calibration(args.save_calibration, result.motions[0])
-                written.append(args.save_calibration)
-            if args.overlay:
-                write_overlay(
-                    args.overlay,
-                    video,
-                    result.motions,
-                    body,
-                    progress=footage.watched(lambda i, n: progress("overlay", i, n), to_end=True),
-                    wanted=options.wanted,
-                )
-                written.append(args.overlay)
-            if args.report:
-                clip = CapturedClip(
-                    video, result.motions, body, captured, args.command_text, options.wanted
-                )
-                write_capture_page(
-                    args.report,
-                    clip,
-                    footage.watched(lambda i, n: progress("report", i, n), to_end=True),
-                )
-                written.append(args.report)
-            named.check()
-            footage.check()
+            captured = replace(result.report, warnings=[*result.report.warnings, *warnings])
+            clip = CapturedClip(
+                video, result.motions, body, captured, args.command_text, options.wanted
+            )
+            written += _write_extras(args, clip, running.footage, progress)
+            running.check()
             report = captured.as_json() | {"outputs": [str(path) for path in written]}
             if args.finished_file:
                 write_finished(args.finished_file, report)
@@ -407,6 +355,56 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     if not args.json:
         print(display_text(summary(report)), file=sys.stderr)
     return report
+
+
+def _check_files(args: argparse.Namespace, video: Path, outputs: list[Path]) -> None:
+    """Check that all results can be written, before anything is read.
+
+    :raises ScopeError: one cannot.
+    """
+    if not args.video and not SAMPLE.is_file():
+        raise UsageError(
+            "the sample clip is only in the repository, not in this installation; "
+            "give a VIDEO to capture"
+        )
+    if args.save_calibration and (not args.views or args.mirror):
+        raise UsageError(
+            "--save-calibration is for several videos, given one after the other, without --mirror"
+        )
+    inputs = vars(args) | {"video": video}
+    check_outputs(outputs, inputs, args.overlay, args.report, args.save_calibration)
+    check_blender(outputs)
+    check_memory_limit(with_scene=any(path.suffix.lower() not in WITHOUT_SCENE for path in outputs))
+
+
+def _write_extras(
+    args: argparse.Namespace, clip: CapturedClip, footage: WatchedFootage, progress: ProgressBar
+) -> list[Path]:
+    """Write what was asked for besides the results, and return the paths.
+
+    :raises ScopeError: a file cannot be written, or the footage was changed.
+    """
+    from .capture.camera.calibration import write_calibration
+    from .capture.overlay_video import write_overlay
+    from .report.capture_page import write_capture_page
+
+    def watched(stage: str) -> Callable[..., None]:
+        return footage.watched(lambda i, n: progress(stage, i, n), to_end=True)
+
+    if args.save_calibration:
+        write_calibration(args.save_calibration, clip.motions[0])
+    if args.overlay:
+        write_overlay(
+            args.overlay,
+            clip.video,
+            clip.motions,
+            clip.body,
+            progress=watched("overlay"),
+            wanted=clip.wanted,
+        )
+    if args.report:
+        write_capture_page(args.report, clip, watched("report"))
+    return [*filter(None, (args.save_calibration, args.overlay, args.report))]
 
 
 def run_batch(args: argparse.Namespace) -> dict[str, Any]:

@@ -42,6 +42,11 @@ class LineRequest:
 
     called: ClassVar[str]  # in messages
     first_key: ClassVar[str]  # which begins it, and no other kind of request
+    content: dict[str, Any]  # the arguments, for which JSON has a form
+
+    def to_json(self) -> str:
+        """Return the request as one line of JSON."""
+        return json.dumps(self.content)
 
     @classmethod
     def is_in(cls, text: str) -> bool:
@@ -76,11 +81,8 @@ class JobRequest(LineRequest):
         """
         self.footage = footage
         self.views = tuple(views)
-        self.values: dict[str, Any] = checked_values(values, Place.WORKER)
-
-    def to_json(self) -> str:
-        """Return the request as one line of JSON."""
-        return json.dumps({"footage": self.footage, "views": self.views, **self.values})
+        self.values = checked_values(values, Place.WORKER)
+        self.content = {"footage": footage, "views": self.views, **self.values}
 
     def key(self, code_version: str) -> str:
         """Return the hexadecimal key of the result: equal only for the same footage, options and
@@ -210,11 +212,8 @@ class LiveRequest(LineRequest):
             )
         self.source = live
         self.online = online
-        self.values: dict[str, Any] = checked_values(values, Place.LIVE_WORKER)
-
-    def to_json(self) -> str:
-        """Return the request as one line of JSON."""
-        return json.dumps({"live": self.source, "online": self.online, **self.values})
+        self.values = checked_values(values, Place.LIVE_WORKER)
+        self.content = {"live": live, "online": online, **self.values}
 
 
 class Commands:
@@ -252,10 +251,7 @@ class FormatsRequest(LineRequest):
         ):
             raise UsageError("a request for formats needs the number of a camera")
         self.source = formats_of
-
-    def to_json(self) -> str:
-        """Return the request as one line of JSON."""
-        return json.dumps({"formats_of": self.source})
+        self.content = {"formats_of": formats_of}
 
 
 class PictureRequest(LineRequest):
@@ -281,8 +277,9 @@ class PictureRequest(LineRequest):
         self.time_s = time_s
         self.rotate = rotate
         self.mirror = mirror
-
-    def to_json(self) -> str:
-        """Return the request as one line of JSON."""
-        values = {"time_s": self.time_s, "rotate": self.rotate, "mirror": self.mirror}
-        return json.dumps({"picture_of": self.footage, **values})
+        self.content = {
+            "picture_of": picture_of,
+            "time_s": time_s,
+            "rotate": rotate,
+            "mirror": mirror,
+        }

@@ -10,7 +10,6 @@ import os
 import sys
 import threading
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import IO, NoReturn
 
@@ -22,8 +21,7 @@ from ..parent import end_with_parent
 from ..temporary import discard, remove
 from .cache import cache_of
 from .request import WARM_UP, Commands, FormatsRequest, JobRequest, LiveRequest, PictureRequest
-from .unfinished import unfinished_capture
-from .watched_footage import WatchedFiles, WatchedFootage
+from .watched_footage import WatchedFiles
 
 _REMOVAL_ATTEMPTS = 20  # an attempt fails if a file is created during it
 # of a capture: with 5, drawing without a graphics card waits for it; compiling ahead of it has 19
@@ -122,40 +120,23 @@ def run(
 def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
     """Capture and write the results."""
     # Imported here, so that a missing package is reported in the panel.
-    from ..capture.long_clips.windowed_clip import lasting
     from ..capture.options import capture_options
-    from ..capture.pipeline import capture
-    from ..capture.several_views.capture_views import capture_views
     from ..untrusted.body_file import load_body
     from .preview import PreviewWriter
+    from .watched_capture import watched_capture
 
-    # What several cameras show is not continued after a kill.
-    folder = None if request.views else cache_of(job_folder)
-    with unfinished_capture(folder, Path(request.footage)) as unfinished:
-        named = WatchedFiles(request.named_files())
-        footage = [unfinished.footage, *(WatchedFootage(Path(view)) for view in request.views)]
-        progress = reporter.progress
-        for each in footage:
-            progress = each.watched(progress)
+    named = WatchedFiles(request.named_files())
+    views = [Path(view) for view in request.views]
+    with watched_capture(cache_of(job_folder), Path(request.footage), views, named) as running:
         with PreviewWriter(job_folder, reporter.send) as watch:
             body = load_body(request.values["body"])
             options = capture_options(request.values)
-            if request.views:
-                videos = [request.footage, *request.views]
-                result = capture_views(videos, body, options, progress, watch)
-            else:
-                observe_frames = lasting(unfinished.folder)
-                result = capture(request.footage, body, options, progress, watch, observe_frames)
-        named.check()
-        for each in footage:
-            each.check()
+            result = running.run(body, options, reporter.progress, watch)
         names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
         reporter.progress("writing", 0, 0)
         for name, motion in zip(names, result.motions, strict=True):
             motion.save(job_folder / name)
-        warnings = [*result.report.warnings, *unfinished.warnings]
-    report = replace(result.report, warnings=warnings)
-    reporter.send("result", motions=names, report=report.as_json())
+    reporter.send("result", motions=names, report=result.report.as_json())
 
 
 def main(job_folder: Path) -> NoReturn:
@@ -194,11 +175,9 @@ def _parsed(line: str) -> Request:
     """
     if line.strip() == WARM_UP:
         return None
-    if FormatsRequest.is_in(line):
-        return FormatsRequest.from_json(line)
-    if PictureRequest.is_in(line):
-        return PictureRequest.from_json(line)
-    return LiveRequest.from_json(line) if LiveRequest.is_in(line) else JobRequest.from_json(line)
+    kinds = (FormatsRequest, PictureRequest, LiveRequest)
+    kind = next((each for each in kinds if each.is_in(line)), JobRequest)
+    return kind.from_json(line)
 
 
 def _confine(request: Request, job_folder: Path) -> None:

@@ -7,15 +7,16 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture import pipeline
+from scope.scope_addon import cli
+from scope.scope_addon.capture.pipeline import Capture
+from scope.scope_addon.capture_report import Report
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line.outputs import FOOTAGE, OTHER_INPUTS, check_outputs
 from scope.scope_addon.errors import ChangedFootageError, UsageError
-from scope.scope_addon.job import worker
+from scope.scope_addon.job import watched_capture, worker
 from scope.scope_addon.job.request import JobRequest
 from scope.scope_addon.job.watched_footage import WatchedFiles
 
@@ -232,7 +233,7 @@ def test_a_file_of_an_option_that_is_replaced_during_a_capture_is_noticed(
         file.with_name("new").write_text(json.dumps(content | {"size": [1920, 1080]}))
         file.with_name("new").replace(file)
 
-    monkeypatch.setattr(pipeline, "capture", replace_file)
+    monkeypatch.setattr(watched_capture, "capture", replace_file)
     if way == "in the panel":
         request = JobRequest(str(SAMPLE), **{option: str(file)})
         sent = io.StringIO()
@@ -266,14 +267,15 @@ def test_a_rig_may_be_edited_during_a_capture(tmp_path, capsys, monkeypatch, tex
     rig = tmp_path / "rig.blend"
     rig.write_bytes(Path(texture_and_rigs[1][0]).read_bytes())
 
-    def placed_videos(_):
-        raise UsageError("the results are written")
-
     def edit(*_, **__):
         os.utime(rig, (1e9, 1e9))
-        return SimpleNamespace(report=SimpleNamespace(placed_videos=placed_videos))
+        return Capture([], Report())
 
-    monkeypatch.setattr(pipeline, "capture", edit)
+    def write(*_, **__):
+        raise UsageError("the results are written")
+
+    monkeypatch.setattr(watched_capture, "capture", edit)
+    monkeypatch.setattr(cli, "write_outputs", write)
     out = str(tmp_path / "out.glb")
     main(["capture", str(SAMPLE), "--retarget", str(rig), "-o", out, "--quiet"])
     assert "the results are written" in capsys.readouterr().err

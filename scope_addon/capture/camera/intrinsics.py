@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -56,7 +57,7 @@ class Camera:
 
         flat = np.ascontiguousarray(points_px, float).reshape(-1, 1, 2)
         undistorted = cv2.undistortPoints(flat, self.intrinsics, self.dist, P=self.intrinsics)
-        return undistorted.reshape(points_px.shape)
+        return cast(FloatArray, undistorted.reshape(points_px.shape))
 
     def zoomed(self, zoom: float) -> Camera:
         """Return the camera with ``zoom`` times the focal length."""
