@@ -29,8 +29,12 @@ from ..scope_addon.scene.actions import Channels
 from ..scope_addon.scene.build import BuildOptions, build_scene
 from ..scope_addon.scene.character.animation import animate_armature
 from ..scope_addon.scene.character.armature import build_armature, rest_pose
-from ..scope_addon.scene.character.body_mesh import build_mesh, rest_vertices_world
-from ..scope_addon.scene.character.expression_keys import add_expression_keys, key_expressions
+from ..scope_addon.scene.character.body_mesh import (
+    add_expression_keys,
+    build_mesh,
+    key_expressions,
+    rest_vertices_world,
+)
 from ..scope_addon.untrusted.body_file import load_body
 
 WRITTEN = 10_000  # frames

@@ -13,20 +13,20 @@ from dataclasses import fields, is_dataclass
 
 import numpy as np
 import pytest
-from scope.scope_addon.edit.clip import resample
+from scope.scope_addon.edit.clip import (
+    floor_trajectory,
+    relative_to_trajectory,
+    resample,
+    with_trajectory,
+)
 from scope.scope_addon.edit.corrections import FeetOnFloor
 from scope.scope_addon.edit.edits import refloor
 from scope.scope_addon.edit.loop import best_cycle, close_cycle
-from scope.scope_addon.edit.root_motion import (
-    floor_trajectory,
-    relative_to_trajectory,
-    with_trajectory,
-)
 from scope.scope_addon.edit.smooth import smoothed
 from scope.scope_addon.edit.spans import interpolate, swap_sides
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.scope_addon.retarget.bone_map import BoneMap
-from scope.scope_addon.retarget.skeleton import Skeleton
+from scope.scope_addon.retarget.rest_pose import Skeleton
 from scope.scope_addon.retarget.transfer import Transfer
 from scope.solver import fit
 from scope.solver.body import Body

@@ -358,7 +358,7 @@ def write_outputs(
             skeleton=args.skeleton,
         )
         if rigs:
-            from ..scene.rig_export import export_on_rig
+            from ..scene.rig_file import export_on_rig
 
             shares = [scene_files] if len(rigs) == 1 else [[path] for path in scene_files]
             for rig, paths in zip(rigs, shares, strict=True):

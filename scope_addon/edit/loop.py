@@ -12,8 +12,7 @@ from ...solver.rotations import exp, log
 from ..arrays import BoolArray, Float64Array, FloatArray
 from ..errors import UsageError
 from ..kinematics.axes import transposed
-from .clip import Clip, keys_within
-from .root_motion import floor_trajectory, relative_to_trajectory
+from .clip import Clip, floor_trajectory, keys_within, relative_to_trajectory
 
 # A difference in velocity of 1 m/s weighs as much as one in position of 0.1 m.
 SPEED_WEIGHT_S = 0.1

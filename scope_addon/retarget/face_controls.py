@@ -28,7 +28,7 @@ from ...solver.errors import InputError
 from ...solver.rotations import exp
 from ..arrays import Float64Array, FloatArray
 from .expression_map import MOVED, TURNED, ExpressionMap, load_expression_map, weighted_sum
-from .skeleton import BoneMotion
+from .rest_pose import BoneMotion
 
 FOLDER = Path(__file__).resolve().parents[2] / "assets" / "face" / "controls"
 # The built-in maps, and bones that only the rig of each has.

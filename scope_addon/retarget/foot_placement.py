@@ -32,13 +32,12 @@ import numpy as np
 from ...solver.body import Body
 from ...solver.rotations import exp, shortest_turn
 from ..arrays import BoolArray, Float64Array, FloatArray
-from ..edit.clip import Clip
-from ..edit.root_motion import about_z
+from ..edit.clip import Clip, about_z
 from ..kinematics.axes import UP, rotated
 from ..kinematics.foot_skin import FootSkin, lower_floors
 from ..kinematics.leg_reach import cross, knee_turn
 from ..kinematics.standing import standing_probability
-from .skeleton import Pose, Skeleton, head_positions
+from .rest_pose import Pose, Skeleton, head_positions
 
 # Thickness of the sole, and length of the heel region.
 _SOLE_M = 0.015

@@ -31,8 +31,7 @@ from ..untrusted.bvh_file import BvhMotion
 from .bone_map import REQUIRED, SIDED_PARTS, SPINE
 from .fingers import bone_ends
 from .guess import IMPOSSIBLE, by_name, guess
-from .rest_pose import RestPose
-from .skeleton import Skeleton
+from .rest_pose import RestPose, Skeleton
 from .smpl_motion import FARTHEST_M, MAX_PEOPLE
 from .transfer import leg_length, rest_alignment
 

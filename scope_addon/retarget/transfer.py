@@ -25,7 +25,7 @@ from ..kinematics.axes import R_WORLD_MODEL, UP
 from ..kinematics.smoothing import interpolate_rotations
 from .bone_map import FINGERS, SPINE, BoneMap
 from .foot_placement import legs_at_rest, place_feet
-from .skeleton import Pose, Skeleton, head_positions
+from .rest_pose import Pose, Skeleton, head_positions
 
 _NEXT = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "hand"}
 # The fourth does not exist in any body: the last phalanx has no end joint.

@@ -25,8 +25,7 @@ from ..notices import Notice, notice
 from . import camera, timing
 from .actions import Channels
 from .budget import check_content, check_last_frame
-from .capture_parts import parts_of, tag_part
-from .character import animation, armature, body_mesh, expression_keys, other_curves
+from .character import animation, armature, body_mesh, other_curves
 from .character.armature import remove_unused_ring
 from .character.correction_list import store_corrections
 from .character.keys import bake_whole_frames
@@ -39,8 +38,10 @@ from .datablocks import (
     check_local,
     enter_object_mode,
     is_part,
+    parts_of,
     remove_blocks,
     short_name,
+    tag_part,
     with_data,
 )
 from .packed_motion import motion_texts
@@ -242,11 +243,9 @@ def _build_person(
     if not baked and body.P:
         body_mesh.add_shape_keys(mesh, drawn, motion.betas)
         of_keys = body_mesh.key_shape(mesh, action, motion.betas, frames[0])
-    if motion.face and expression_keys.add_expression_keys(mesh, drawn):
+    if motion.face and body_mesh.add_expression_keys(mesh, drawn):
         of_keys = of_keys or Channels(mesh.data.shape_keys, action)
-        expression_keys.key_expressions(
-            mesh, of_keys, motion, frames, options.frame_rate == "resample"
-        )
+        body_mesh.key_expressions(mesh, of_keys, motion, frames, options.frame_rate == "resample")
     body_mesh.skin_to_armature(mesh, rig, drawn)
     rig[SOURCE_TAG] = motion.source
     rig["scope_body"] = body.name

@@ -38,7 +38,7 @@ from ..kinematics.smoothing import continuous_quaternions
 from ..motion import Motion
 from ..notices import Notice, notice
 from .actions import Channels, fcurves_of
-from .datablocks import action_of
+from .datablocks import VIEW_TAG, action_of, view_number
 from .stored_values import stored_numbers
 from .timing import rows_of_scene_frames
 
@@ -48,7 +48,6 @@ _MAX_DURATION = 1_000_000  # frames; after this duration Blender would show the 
 # Custom property of a capture's collection and its further cameras: width, height and pixel aspect
 # of the footage.
 _PICTURE = "scope_picture"
-_VIEW = "scope_view"  # custom property of a capture's further cameras: their number, from 0
 SENSOR_WIDTH = 36.0  # millimetres; only its ratio to the focal length matters
 # OpenCV camera axes in those of a Blender camera (which looks along its −z with y up).
 R_CAMERA_BLENDCAM = np.diag([1.0, -1.0, -1.0])
@@ -135,15 +134,9 @@ def build_view(
     """
     seen = motion.from_view(number)
     obj = build_camera(name, seen, collection, frames)
-    obj[_VIEW] = number
+    obj[VIEW_TAG] = number
     store_resolution(obj, seen)
     return obj
-
-
-def view_number(camera: bpy.types.Object) -> int | None:
-    """Return the number of a capture's further camera; None of its first one."""
-    number = camera.get(_VIEW)
-    return number if isinstance(number, int) else None
 
 
 def set_lens(data: bpy.types.Camera, motion: Motion) -> None:

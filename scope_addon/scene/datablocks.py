@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Datablocks of Blender: their names, which are no longer than Blender allows, and not unique where
 some are linked from another file; finding them again, since undo may have removed or replaced them;
-and removing them.
+and removing them. And what the custom properties of a captured object say: the user may have put a
+camera, a rig or a garment beside those that were made for a capture.
 
 A scene that is linked from another file cannot be changed: Blender refuses, or does not save it.
 """
@@ -26,6 +27,9 @@ MARKERS = "scope_markers"
 SOURCE_TAG = "scope_source"  # custom property of a captured armature: what it was captured from
 # custom property of what was made for a capture: a body, a camera, the action of a person
 PART_TAG = "scope_part"
+# custom property of the empty that carries a person's root motion, or a rig's
+ROOT_TAG = "scope_root"
+VIEW_TAG = "scope_view"  # custom property of a capture's further cameras: their number, from 0
 # Kinds of datablock that a file or a capture may contain, users before the datablocks that they
 # use. Shape keys go with their mesh, and ``temporary_scene`` removes scenes.
 _KINDS = (
@@ -90,6 +94,12 @@ def with_data(obj: bpy.types.Object) -> list[bpy.types.ID]:
     """Return an object, its data and the shape keys of that, as far as it has them."""
     found = [obj, obj.data, getattr(obj.data, "shape_keys", None)]
     return [block for block in found if block is not None]
+
+
+def view_number(camera: bpy.types.Object) -> int | None:
+    """Return the number of a capture's further camera; None of its first one."""
+    number = camera.get(VIEW_TAG)
+    return number if isinstance(number, int) else None
 
 
 def shape_keys_of(armature: bpy.types.Object) -> list[bpy.types.Key]:
@@ -243,3 +253,39 @@ def remove(blocks: set[tuple[str, int]]) -> None:
         return
     remove_blocks([block for kind, uid in blocks if (block := found(kind, "", uid)) is not None])
     bpy.context.view_layer.update()  # it would still list removed objects
+
+
+def tag_part(block: bpy.types.ID) -> None:
+    """Mark a body, camera or action as made for the capture whose collection it is in."""
+    block[PART_TAG] = True
+
+
+def cameras_in(collection: bpy.types.Collection) -> list[bpy.types.Object]:
+    """Return the cameras of a capture: of the first videos of its clips, and then the further ones
+    by their numbers.
+    """
+    cameras = [obj for obj in collection.all_objects if obj.type == "CAMERA" and is_part(obj)]
+    return sorted(cameras, key=_place_of)
+
+
+def cameras_of_clip(collection: bpy.types.Collection) -> list[bpy.types.Object]:
+    """Return the camera of a capture's first video, if it is there, and the further ones."""
+    cameras = cameras_in(collection)
+    first = [camera for camera in cameras if view_number(camera) is None]
+    return [*first[:1], *cameras[len(first) :]]
+
+
+def parts_of(collection: bpy.types.Collection) -> list[bpy.types.Object]:
+    """Return the people of a capture, their bodies and root objects, and its cameras."""
+    return [obj for obj in collection.all_objects if _is_of_capture(obj)]
+
+
+def _place_of(camera: bpy.types.Object) -> int:
+    number = view_number(camera)
+    return -1 if number is None else number
+
+
+def _is_of_capture(obj: bpy.types.Object) -> bool:
+    if ROOT_TAG in obj:  # which a rig that the motion was retargeted to may have, too
+        return not obj.children or any(map(is_person, obj.children_recursive))
+    return is_person(obj) or is_part(obj)

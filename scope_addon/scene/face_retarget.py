@@ -23,7 +23,7 @@ from ..retarget.face_controls import (
     guess_control_map,
     has_face_controls,
 )
-from ..retarget.skeleton import BoneMotion
+from ..retarget.rest_pose import BoneMotion
 from .actions import (
     Channels,
     assign_action,
@@ -36,7 +36,7 @@ from .actions import (
     shape_key_path,
     used_slot,
 )
-from .character.expression_keys import MOVES, has_expression_keys
+from .character.body_mesh import MOVES, has_expression_keys
 from .datablocks import action_of
 from .rig_action import (
     channel_of_rotation,

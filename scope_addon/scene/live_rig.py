@@ -20,7 +20,7 @@ from ..arrays import Float64Array, FloatArray
 from ..edit.clip import Clip
 from ..kinematics.axes import transform_points
 from ..retarget.bone_map import BoneMap
-from ..retarget.skeleton import basis
+from ..retarget.rest_pose import basis
 from ..retarget.transfer import Transfer
 from .character.root_object import parent_transform, topmost
 from .datablocks import found

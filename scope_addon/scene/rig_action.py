@@ -12,7 +12,7 @@ from mathutils import Matrix
 
 from ..arrays import Float64Array
 from ..kinematics.smoothing import continuous_quaternions
-from ..retarget.skeleton import BoneMotion, Skeleton
+from ..retarget.rest_pose import BoneMotion, Skeleton
 from .actions import Channels, bone_path, fcurves_of, nla_strips, read_keys
 from .stored_values import KEYS_OF, source_of
 from .timing import Retiming, retime_keys

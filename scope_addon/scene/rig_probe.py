@@ -24,8 +24,7 @@ from ..kinematics.axes import transform_points, transposed, unscaled
 from ..notices import Notice, notice
 from ..retarget.bone_map import PHALANGES, check_bone_count
 from ..retarget.fingers import bone_ends
-from ..retarget.rest_pose import RestPose
-from ..retarget.skeleton import BoneMotion, Skeleton
+from ..retarget.rest_pose import BoneMotion, RestPose, Skeleton
 from .actions import assign_action, bone_path, fcurves_of, nla_strips, read_keys, used_slot
 from .character.root_object import root_object, topmost
 from .datablocks import changed, is_deformed_by, modifiers_off

@@ -14,8 +14,7 @@ from mathutils import Matrix
 from ...solver.body import Body
 from ...solver.errors import InputError
 from ..arrays import Float64Array, FloatArray
-from ..edit.clip import Clip
-from ..edit.root_motion import about_z, floor_trajectory
+from ..edit.clip import Clip, about_z, floor_trajectory
 from ..errors import UsageError
 from ..kinematics.axes import rotated, transposed
 from ..notices import PHRASES, Notice, notice
@@ -23,9 +22,8 @@ from ..retarget.bone_map import PHALANGES, SPINE, BoneMap
 from ..retarget.expression_map import ExpressionMap
 from ..retarget.foot_placement import frames_on_one_floor
 from ..retarget.guess import SHAPED, guess
-from ..retarget.rest_pose import rest_faults
+from ..retarget.rest_pose import BoneMotion, Pose, Skeleton, basis, rest_faults
 from ..retarget.rig_source import ROOTS
-from ..retarget.skeleton import BoneMotion, Pose, Skeleton, basis
 from ..retarget.transfer import Transfer, leg_ratio
 from .actions import add_cycles, bone_path, fcurves, is_cyclic, nla_strips
 from .character.keys import read_clip

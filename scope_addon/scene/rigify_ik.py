@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..retarget.skeleton import BoneMotion
+from ..retarget.rest_pose import BoneMotion
 from .rig_probe import basis_of
 
 # Limb, middle bone, end and, of legs, toe.

@@ -31,18 +31,19 @@ from ..options import Place
 from ..options.body_choice import chosen_body
 from ..options.capture import AUTO
 from ..review_spans import Span, body_sigma_m, find_review_spans
-from ..scene.animated import is_animated
 from ..scene.build import BuildOptions, BuildResult, build_scene
 from ..scene.datablocks import captures_of, check_local, found, holds
+from ..scene.match_rate import is_animated
 from ..scene.packed_motion import pack_motion
 from ..scene.stored_values import FrameSpan, in_scene
 from ..scene.timing import current_frame_kept
-from ..scene.window_scene import window_shows
+from ..scene.visibility import window_shows
 from ..untrusted.body_file import load_body
-from . import preview_picture, warm_up
+from . import warm_up
 from .captures import hide_others, show_again
 from .declared_properties import option_values
 from .frame_rate_operators import rate_warnings
+from .job_operator import show_preview
 from .preferences import body_file, cache, preferences, python_command
 from .reporting import add_warning
 from .scene_camera import scene_camera_path
@@ -156,7 +157,7 @@ class CaptureJob:
             pixels = (self.worker.job_folder / Path(message["file"]).name).read_bytes()
         except OSError:
             return  # on Windows, while the worker replaces the file
-        preview_picture.show(pixels, message["width"], message["height"])
+        show_preview(pixels, message["width"], message["height"])
 
     def _build(self, scene: bpy.types.Scene, captured: CachedCapture) -> None:
         report = Report.from_json(captured.report)

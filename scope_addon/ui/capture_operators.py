@@ -16,16 +16,17 @@ from bpy.props import IntProperty
 from ...solver.errors import ScopeError
 from ..errors import UsageError
 from ..scene.datablocks import found
-from . import preview_picture, warm_up
+from ..scene.visibility import window_shows
+from . import warm_up
 from .captures import shown_capture, unit_text
 from .declared_properties import split
 from .export_operators import unused_path, write_at_own_rate, write_captures
 from .file_field import FootageBrowser, SeveralFootageBrowser, chosen_files, stored_path
-from .job_operator import JobOperator, JobState, clear_status_bar
+from .job_operator import JobOperator, JobState, clear_preview, clear_status_bar
 from .live_properties import state as live_state
 from .reporting import iface_, refuse, restore_libraries, rpt_, sentence
-from .sidebar import redraw_sidebars, redraw_sidebars_twice, show_tab
 from .view_operators import hide_startup_cube, show_new_capture
+from .viewports import redraw_sidebars, redraw_sidebars_twice, show_tab
 
 if TYPE_CHECKING:
     from .capture_job import CaptureJob
@@ -51,7 +52,7 @@ class _State(JobState):
     def stop(self) -> None:
         """End the job in any state, and remove its preview."""
         super().stop()
-        preview_picture.clear()
+        clear_preview()
 
 
 state = _State()
@@ -397,7 +398,6 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         """Write the files of the clip that was captured last, if there shall be any; return why
         that failed, or an empty text.
         """
-        from ..scene.window_scene import window_shows
         from .capture_job import AUTOMATIC, build_options
         from .frame_rate_operators import differs
 

@@ -28,7 +28,7 @@ from bpy.props import (
 from ..footage import display_text
 from ..options import Place, Section, options_at
 from ..scene.stored_values import parse_spans
-from . import preview_picture, warm_up
+from . import warm_up
 from .capture_operators import CAPTURING, DONE, FAILED, NO_FILES, WAITING, state
 from .captured_person import has_captured_person
 from .captures import (
@@ -45,6 +45,7 @@ from .declared_properties import PATH_OPTIONS, draw_section, property_name, spli
 from .export_operators import FORMATS, is_available
 from .file_field import draw_file, path_text
 from .frame_rate_operators import differs, keyed_for
+from .job_operator import preview_icon
 from .reporting import iface_, stored_warning, warning_text
 from .translations import CONTEXT
 
@@ -160,7 +161,7 @@ def _draw_progress(
     context: bpy.types.Context, layout: bpy.types.UILayout, progress: JobProgress
 ) -> None:
     layout.progress(text=f"{100 * progress.fraction:.0f} %", factor=progress.fraction)
-    if icon := preview_picture.icon_id():
+    if icon := preview_icon():
         layout.template_icon(icon_value=icon, scale=10.0)
     for part in progress.lines(iface_):
         draw_text(context, layout, part)

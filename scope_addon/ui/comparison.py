@@ -27,10 +27,19 @@ from bpy.app.handlers import persistent
 from mathutils import Matrix, Quaternion, Vector
 
 from ...solver.errors import ScopeError
-from ..scene.datablocks import captures_of, enter_object_mode, holds, is_in_layer, is_person
+from ..scene.datablocks import (
+    cameras_of_clip,
+    captures_of,
+    enter_object_mode,
+    holds,
+    is_in_layer,
+    is_person,
+    view_number,
+)
+from ..scene.visibility import show
 from .captured_person import body_of, captured_armature
 from .captures import people_of
-from .sidebar import main_region, viewport_at, viewports
+from .viewports import main_region, viewport_at, viewports
 
 if TYPE_CHECKING:
     from ..arrays import Float64Array
@@ -53,9 +62,6 @@ _sides: set[int] = set()  # areas that showed a capture from its side
 
 def cameras_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Return the cameras of the scene's last capture, the one of its first video first."""
-    from ..scene.camera import view_number
-    from ..scene.capture_parts import cameras_of_clip
-
     collection = scene.scope.result.collection
     cameras = cameras_of_clip(collection) if collection else []
     return cameras if cameras and view_number(cameras[0]) is None else []
@@ -278,8 +284,6 @@ def _show_alone(
     """Show only the capture in local view, because other objects could hide the footage or the
     body.
     """
-    from ..scene.visibility import show
-
     selected = context.selected_objects
     enter_object_mode(context.view_layer)
     with _in(context.window, area):

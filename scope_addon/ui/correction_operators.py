@@ -19,7 +19,7 @@ from bpy.props import (
 
 from ..errors import UsageError
 from ..scene.character.correction_list import listed_corrections, store_corrections
-from ..scene.datablocks import captures_of, holds, is_person
+from ..scene.datablocks import cameras_of_clip, captures_of, holds, is_person
 from ..scene.stored_values import LAST_FRAME, start_frame
 from .captured_person import (
     EditOperator,
@@ -123,7 +123,6 @@ def change_world(
     from ..edit.corrected_motion import corrections_of
     from ..edit.corrections import world_of
     from ..scene.camera import same_camera
-    from ..scene.capture_parts import cameras_of_clip
     from ..scene.character.upright_scene import turn_camera
     from ..scene.timing import keyed_rate
     from ..scene.transaction import all_or_nothing

@@ -17,7 +17,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..errors import UsageError
 from ..options import Place
-from ..output_paths import files_of_people, left_over, person_paths
+from ..output_paths import check_output, files_of_people, left_over, person_paths
 from ..scene.datablocks import captures_of, holds
 from ..temporary import hold, release
 from .captured_person import body_of, motion_of, stored_person
@@ -242,7 +242,7 @@ class SCOPE_OT_export(SavingOperator):
 
         :raises UsageError: no rig is chosen, or the format has none.
         """
-        from ..scene.rig_export import export_rig
+        from ..scene.rig_file import export_rig
 
         rig = scene.scope_retarget.rig
         if self.format in _OF_MOTION:
@@ -356,7 +356,6 @@ def _write_motions(path: Path, collections: list[bpy.types.Collection]) -> list[
 
     :raises UsageError: nobody is left of the captures.
     """
-    from ..output_paths import check_output
     from ..scene.export.without_scene import write_without_scene
 
     people = [person for capture in collections for person in people_of(capture)]
@@ -400,7 +399,6 @@ class SCOPE_OT_save_calibration(SavingOperator):
         :raises UsageError: the file has no name or folder, or the captured person was deleted.
         """
         from ..capture.camera.calibration import write_calibration
-        from ..output_paths import check_output
 
         path = check_output(output_file(self.filepath, self.suffix()), (self.suffix(),))
         people = people_of(shown_capture(context.scene))

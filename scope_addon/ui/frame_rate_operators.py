@@ -97,10 +97,9 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Change the rate and move the captures in time."""
-        from ..scene.animated import other_animation
         from ..scene.character.keys import bake_whole_frames, read_clip
         from ..scene.character.root_object import root_object
-        from ..scene.match_rate import change_rate
+        from ..scene.match_rate import change_rate, other_animation
         from ..scene.timing import keyed_rate, scene_rate
         from ..scene.transaction import all_or_nothing
 

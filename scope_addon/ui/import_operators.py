@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, StringProperty
 
+from ..capture_report import Report
 from ..errors import UsageError
 from ..footage import FOOTAGE_SUFFIXES
 from ..options import option
@@ -126,7 +127,6 @@ class SCOPE_OT_import_motion(ReportingOperator):
 
 def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: BuildOptions) -> None:
     """Build one motion and store it and its result with the scene"""
-    from ..capture_report import Report
     from ..scene.build import build_scene
     from ..scene.packed_motion import pack_motion
     from .capture_job import show_build

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What captures of footage and live captures share in Blender's window: a job that a timer
-advances, until it ends.
+advances, until it ends; and the preview of the current frame as an icon for the panel. It is not a
+datablock, so no .blend file contains it.
 """
 
 from __future__ import annotations
@@ -8,9 +9,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import bpy
+import bpy.utils.previews
 
 from .reporting import sentence
-from .sidebar import is_over_tab, redraw_sidebars_twice
+from .viewports import is_over_tab, redraw_sidebars_twice
 
 
 class JobState:
@@ -120,3 +122,36 @@ def clear_status_bar() -> None:
     for workspace in bpy.data.workspaces:
         with bpy.context.temp_override(workspace=workspace):  # Blender sets only the context's text
             workspace.status_text_set(None)
+
+
+_previews: bpy.utils.previews.ImagePreviewCollection | None = None
+
+
+def show_preview(pixels: bytes, width: int, height: int) -> None:
+    """Replace the picture; incomplete pictures are ignored.
+
+    :param pixels: RGBA bytes, bottom row first.
+    """
+    import numpy as np  # imported here, so that Blender starts without it
+
+    if len(pixels) != 4 * width * height or not pixels:
+        return
+    global _previews
+    if _previews is None:
+        _previews = bpy.utils.previews.new()
+    icon = _previews.get("frame") or _previews.new("frame")
+    icon.image_size = width, height
+    icon.image_pixels.foreach_set(np.frombuffer(pixels, np.int32))
+
+
+def preview_icon() -> int:
+    """Return the icon for ``template_icon``; 0 if there is no picture."""
+    return _previews["frame"].icon_id if _previews is not None and "frame" in _previews else 0
+
+
+def clear_preview() -> None:
+    """Remove the picture."""
+    global _previews
+    if _previews is not None:
+        bpy.utils.previews.remove(_previews)
+    _previews = None

@@ -35,8 +35,7 @@ from ..scene.datablocks import check_local, is_in_layer, scene_of
 from ..scene.live_body import LiveBody
 from ..scene.live_rig import LiveRig
 from ..scene.rig_retarget import usable_guess
-from ..scene.visibility import SceneBefore, hide, select_only
-from ..scene.window_scene import window_shows
+from ..scene.visibility import SceneBefore, hide, select_only, window_shows
 from ..temporary import remove
 from ..untrusted.body_file import load_body
 from .capture_job import (
@@ -49,8 +48,7 @@ from .capture_job import (
 from .captures import hide_others, show_again
 from .live_properties import with_login
 from .preferences import cache, python_command
-from .retarget_maps import listed_map
-from .retarget_operators import retarget_options, retarget_to_chosen_rig
+from .retarget_operators import listed_map, retarget_options, retarget_to_chosen_rig
 
 NOTICE_S = 1.0  # for which poses that were under way when a notice came do not end it
 QUIET_S = 2.0  # without a pose, after which the panel says so

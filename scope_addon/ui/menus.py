@@ -8,7 +8,7 @@ from __future__ import annotations
 import bpy
 
 from .captured_person import captured_armature
-from .correction_panel import draw_corrections
+from .edit_panel import draw_corrections
 from .export_operators import FORMATS, is_available
 from .reporting import iface_
 

@@ -12,10 +12,9 @@ import bpy
 from ...solver.errors import ScopeError
 from . import comparison
 from .capture_operators import nothing_runs
-from .drawing import Pointer, redraw_viewport, viewport_of
 from .preferences import cache, python_command
 from .reporting import iface_, refuse, sentence
-from .sidebar import redraw_sidebars
+from .viewports import Pointer, redraw_sidebars, redraw_viewport, region_at
 
 if TYPE_CHECKING:
     from ..job.footage_picture import FootagePicture, PictureProcess
@@ -106,7 +105,7 @@ class SCOPE_OT_pick_person(bpy.types.Operator):
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Wait for the frame and the click."""
         x, y = self._pointer.place(event)
-        viewport = viewport_of(self._area)
+        viewport = region_at(self._area)
         is_cancelled = event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS"
         if is_cancelled or viewport is None or (event.type == "TIMER" and not self._listen()):
             self.cancel(context)

@@ -18,9 +18,8 @@ from ..scene.datablocks import is_in_layer
 from .captured_person import captured_armature, may_edit
 from .comparison import camera_of
 from .correction_operators import last_pin_warnings
-from .drawing import Pointer, draw_disc, draw_line, viewport_of
 from .reporting import iface_, rpt_
-from .sidebar import redraw_sidebars, viewports
+from .viewports import Pointer, draw_disc, draw_line, redraw_sidebars, region_at, viewports
 
 _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 HANDLES = ("head", "pelvis", *(f"{side}_{name}" for side in ("left", "right") for name in _SIDED))
@@ -129,7 +128,7 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
         if not session.dragged:
             session.follow(captured_armature(context))
             _move_to_viewport(session, context.window, (x, y))
-        viewport = viewport_of(session.area)
+        viewport = region_at(session.area)
         if viewport is None or session.armature not in bpy.data.objects:
             self.cancel(context)
             return {"CANCELLED"}

@@ -20,7 +20,7 @@ from bpy.props import (
 from ..scene.datablocks import is_person
 from .capture_panel import PersonTab, Tab
 from .captured_person import draw_active_person
-from .retarget_maps import (
+from .retarget_operators import (
     SHAPE_KEY,
     bones_move,
     common_prefix,

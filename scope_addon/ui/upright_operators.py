@@ -16,9 +16,8 @@ from ..errors import UsageError
 from .captured_person import captured_armature, may_edit, motion_of
 from .comparison import camera_of
 from .correction_operators import CorrectionOperator, change_world, shown_frame
-from .drawing import Pointer, draw_line, redraw_viewport, viewport_of
 from .reporting import iface_, refuse, rpt_, sentence
-from .sidebar import main_region
+from .viewports import Pointer, draw_line, main_region, redraw_viewport, region_at
 
 if TYPE_CHECKING:
     from ...solver.body import Body
@@ -185,7 +184,7 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
                 region = main_region(area)
                 line.ends = [(x - region.x, y - region.y)] * 2
             return {"PASS_THROUGH"} if event.type.startswith(_NAVIGATION) else {"RUNNING_MODAL"}
-        viewport = viewport_of(line.area)
+        viewport = region_at(line.area)
         if viewport is None:
             self.cancel(context)
             return {"CANCELLED"}

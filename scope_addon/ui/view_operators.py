@@ -8,14 +8,15 @@ from bpy.props import IntProperty
 from mathutils import Matrix
 
 from ..footage import PICTURE_SUFFIXES
-from ..scene.datablocks import holds
+from ..scene.datablocks import holds, view_number
 from ..scene.stored_values import start_frame
+from ..scene.visibility import hide_again
 from . import comparison
 from .captured_person import captured_people, motion_if_stored
 from .captures import people_of
 from .comparison import camera_of, cameras_of, is_looking_through, is_side_view
 from .reporting import ReportingOperator, refuse, rpt_
-from .sidebar import main_region, redraw_sidebars_twice, viewport_of
+from .viewports import main_region, redraw_sidebars_twice, viewport_of
 
 
 def hide_startup_cube(context: bpy.types.Context) -> None:
@@ -71,8 +72,6 @@ def show_new_capture(context: bpy.types.Context, scene: bpy.types.Scene | None) 
 
 def _hide_others_again(context: bpy.types.Context, shown: bpy.types.Collection) -> None:
     """Hide people of other captures than the shown one who were shown for a comparison alone."""
-    from ..scene.visibility import hide_again
-
     for other in [obj for obj in captured_people(context) if not holds(shown, obj)]:
         hide_again(other, context.view_layer)
 
@@ -119,8 +118,6 @@ class SCOPE_OT_look_through(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the scene's camera and resolution, and the viewport's view."""
-        from ..scene.visibility import hide_again
-
         shown = context.scene.scope.result.collection
         camera = camera_of(context.scene)
         if is_looking_through(context):
@@ -156,8 +153,6 @@ class SCOPE_OT_compare_view(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the scene's camera and resolution, and what the viewport shows."""
-        from ..scene.camera import view_number
-
         scene = context.scene
         cameras = cameras_of(scene)
         if self.index >= len(cameras):

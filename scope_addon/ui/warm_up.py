@@ -21,7 +21,7 @@ from ..machine_code.kernel_count import kernel_count
 from ..temporary import discard, new_folder
 from .preferences import PACKAGE, cache, preferences, python_command
 from .reporting import iface_
-from .sidebar import redraw_sidebars
+from .viewports import redraw_sidebars
 
 if TYPE_CHECKING:
     import subprocess

@@ -4,8 +4,7 @@
 import numpy as np
 import pytest
 from scope.scope_addon.edit import loop
-from scope.scope_addon.edit.clip import Clip
-from scope.scope_addon.edit.root_motion import about_z
+from scope.scope_addon.edit.clip import Clip, about_z
 from scope.scope_addon.errors import UsageError
 from scope.solver.rotations import exp
 

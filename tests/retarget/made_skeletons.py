@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.scope_addon.retarget.bone_map import PARTS, BoneMap
-from scope.scope_addon.retarget.skeleton import Skeleton
+from scope.scope_addon.retarget.rest_pose import Skeleton
 from scope.solver.rotations import exp, shortest_turn
 
 from ..edit.walking import BETAS, BODY, NAMES

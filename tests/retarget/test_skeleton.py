@@ -6,7 +6,7 @@ them.
 from __future__ import annotations
 
 import numpy as np
-from scope.scope_addon.retarget.skeleton import Skeleton, basis, head_positions
+from scope.scope_addon.retarget.rest_pose import Skeleton, basis, head_positions
 from scope.solver.rotations import exp
 
 FRAMES = 7

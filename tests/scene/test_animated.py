@@ -7,9 +7,9 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.scene.actions import push_to_nla
-from scope.scope_addon.scene.animated import is_animated, other_animation
 from scope.scope_addon.scene.build import build_scene
 from scope.scope_addon.scene.footage_strip import strips_of
+from scope.scope_addon.scene.match_rate import is_animated, other_animation
 
 from ..made_motion import made_motion
 

@@ -17,8 +17,7 @@ from scope.benchmarks.rigs.measured import measured
 from scope.scope_addon.retarget.rig_source import rig_source
 from scope.scope_addon.scene.build import NEW_SCENE
 from scope.scope_addon.scene.export import formats
-from scope.scope_addon.scene.rig_export import export_on_rig
-from scope.scope_addon.scene.rig_file import load_rig, rig_bone_map
+from scope.scope_addon.scene.rig_file import export_on_rig, load_rig, rig_bone_map
 from scope.scope_addon.scene.rig_retarget import retarget, usable_guess
 from scope.solver.errors import InputError
 

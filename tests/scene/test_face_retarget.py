@@ -24,7 +24,7 @@ from scope.scope_addon.scene.face_retarget import (
     faces_of,
     retarget_expressions,
 )
-from scope.scope_addon.scene.rig_export import export_on_rig
+from scope.scope_addon.scene.rig_file import export_on_rig
 from scope.solver.body import Body
 
 from ..edit.walking import motion_of, walk

@@ -16,8 +16,7 @@ from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import NEW_SCENE
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import ExportOptions
-from scope.scope_addon.scene.rig_export import export_on_rig, export_rig
-from scope.scope_addon.scene.rig_file import check_rig
+from scope.scope_addon.scene.rig_file import check_rig, export_on_rig, export_rig
 from scope.scope_addon.scene.rig_retarget import guess_bone_map
 from scope.solver.errors import InputError
 

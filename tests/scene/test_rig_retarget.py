@@ -8,7 +8,7 @@ from mathutils import Matrix
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.retarget.bone_map import BoneMap
 from scope.scope_addon.scene.export.export import ExportOptions
-from scope.scope_addon.scene.rig_export import export_rig
+from scope.scope_addon.scene.rig_file import export_rig
 from scope.scope_addon.scene.rig_retarget import guess_bone_map
 from scope.solver.errors import InputError
 from scope.solver.rotations import exp

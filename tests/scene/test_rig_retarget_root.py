@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
-from scope.scope_addon.edit.root_motion import with_trajectory
+from scope.scope_addon.edit.clip import with_trajectory
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.character.root_object import (
     move_root_motion_to_bones,

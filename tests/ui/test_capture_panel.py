@@ -238,7 +238,7 @@ def test_a_cache_beside_a_file_that_was_never_saved_is_not_in_the_current_folder
 
 
 def test_the_preview_is_shown_during_a_capture(fake_worker, footage):
-    from scope.scope_addon.ui import preview_picture
+    from scope.scope_addon.ui import job_operator
     from scope.scope_addon.ui.capture_job import CaptureJob
 
     fake_worker(
@@ -249,13 +249,13 @@ def test_the_preview_is_shown_during_a_capture(fake_worker, footage):
     bpy.context.scene.scope.footage = str(footage)
     state.job = job = CaptureJob(bpy.context.scene)
     wait_for(lambda: job.step() and job.progress.done)
-    icon = preview_picture._collection["frame"]
+    icon = job_operator._previews["frame"]
     assert tuple(icon.image_size) == (3, 2)
     assert icon.image_pixels[0] == int.from_bytes(bytes(range(4)), "little")
     end_capture()
-    assert preview_picture.icon_id() == 0
-    preview_picture.show(b"half", 3, 2)
-    assert preview_picture.icon_id() == 0
+    assert job_operator.preview_icon() == 0
+    job_operator.show_preview(b"half", 3, 2)
+    assert job_operator.preview_icon() == 0
 
 
 def test_progress_shows_stage_speed_and_remaining_time():

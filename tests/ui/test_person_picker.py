@@ -72,7 +72,7 @@ class Tool:
 @pytest.fixture
 def viewport(monkeypatch):
     region = SimpleNamespace(x=100, y=20)
-    monkeypatch.setattr(person_picker, "viewport_of", lambda _: (None, region))
+    monkeypatch.setattr(person_picker, "region_at", lambda _: (None, region))
     monkeypatch.setattr(person_picker, "redraw_viewport", lambda _: None)
     monkeypatch.setattr(
         person_picker.comparison, "visible_part", lambda *_: (0.0, 400.0, 0.0, 300.0)

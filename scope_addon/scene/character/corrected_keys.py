@@ -21,7 +21,7 @@ import numpy as np
 
 from ....solver.body import Body
 from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
-from ...edit.clip import Clip, differ, sample
+from ...edit.clip import Clip, differ, relative_to_trajectory, sample, with_trajectory
 from ...edit.corrected_motion import corrections_of, floor_of, pin_in_world, shot_of, uncorrected
 from ...edit.corrections import (
     Correction,
@@ -33,7 +33,6 @@ from ...edit.corrections import (
     world_of,
 )
 from ...edit.edits import edited, floor_above, foot_height, interpolated, moved_clip, refloor
-from ...edit.root_motion import relative_to_trajectory, with_trajectory
 from ...edit.smooth import smoothed
 from ...edit.solve_pins import Shot, missed, resolve
 from ...errors import UsageError

@@ -14,9 +14,8 @@ from mathutils import Matrix
 
 from ....solver.body import Body
 from ...arrays import Float64Array
-from ...edit.clip import Clip
+from ...edit.clip import Clip, floor_trajectory, relative_to_trajectory, with_trajectory
 from ...edit.edits import moved_clip
-from ...edit.root_motion import floor_trajectory, relative_to_trajectory, with_trajectory
 from ...errors import UsageError
 from ..actions import (
     Channels,
@@ -28,14 +27,13 @@ from ..actions import (
     read_keys,
     used_slot,
 )
-from ..datablocks import action_of, remove_blocks
+from ..datablocks import ROOT_TAG, action_of, remove_blocks
 from ..packed_motion import apart_at_cuts
 from ..stored_values import stored_numbers
 from ..timing import Retiming
 from ..visibility import world_matrix
 from .keys import read_clip, write_clip
 
-ROOT_TAG = "scope_root"  # custom property of the empty
 # of an empty whose armature stays in place: the trajectory it does not follow
 _UNUSED_TRAJECTORY = "scope_path"
 # properties with an object's transform

@@ -17,12 +17,15 @@ from ...errors import UsageError
 from ...kinematics.smoothing import on_one_hemisphere
 from .. import actions
 from ..camera import set_resolution
-from ..character.body_mesh import mixed_vertices, shape_key_name
-from ..character.expression_keys import copy_expressions, expression_offsets
+from ..character.body_mesh import (
+    copy_expressions,
+    expression_offsets,
+    mixed_vertices,
+    shape_key_name,
+)
 from ..datablocks import changed, is_deformed_by
 from ..transaction import RENDER
-from ..visibility import world_matrix
-from ..window_scene import window_shows
+from ..visibility import window_shows, world_matrix
 
 
 @contextmanager

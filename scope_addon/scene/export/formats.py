@@ -43,9 +43,8 @@ from mathutils import Matrix
 from ...errors import OutputError
 from ...kinematics.axes import transform_points, transposed, unscaled
 from .. import timing
-from ..capture_parts import cameras_in
 from ..character.root_object import parent_transform, root_object
-from ..datablocks import changed
+from ..datablocks import cameras_in, changed
 from . import bvh
 from .fbx_file import correct_fbx
 from .usd_file import has_content, is_whole_crate, saved_layers

@@ -11,7 +11,7 @@ import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.export.export import ExportOptions, export_motions
 from scope.scope_addon.scene.export.fbx_file import below
-from scope.scope_addon.scene.rig_export import export_rig
+from scope.scope_addon.scene.rig_file import export_rig
 
 from ..exported import fbx_models, fbx_objects, fbx_properties, glb_values, read_back, read_glb
 from ..made_rigs import build_rig

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.scene.export.export import ExportOptions
-from scope.scope_addon.scene.rig_export import export_rig
+from scope.scope_addon.scene.rig_file import export_rig
 
 from ..exported import read_back
 from ..made_rigs import build_rig

@@ -9,8 +9,7 @@ import bpy
 import pytest
 from scope.scope_addon.ui import live_operators
 from scope.scope_addon.ui.capture_operators import state as capture_state
-from scope.scope_addon.ui.live_operators import end_live, play_scene
-from scope.scope_addon.ui.live_panel import SCOPE_PT_live
+from scope.scope_addon.ui.live_operators import SCOPE_PT_live, end_live, play_scene
 from scope.scope_addon.ui.live_properties import state
 
 

@@ -14,7 +14,7 @@ import pytest
 from mathutils import Vector
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.ui import pin_tool
-from scope.scope_addon.ui.drawing import Pointer
+from scope.scope_addon.ui.viewports import Pointer
 
 from ...edit.walking import motion_of, walk
 from ...scene.made_rigs import captured_with

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import build_scene
-from scope.scope_addon.ui.retarget_maps import common_prefix
+from scope.scope_addon.ui.retarget_operators import common_prefix
 
 from ...edit.walking import BODY, motion_of, walk
 from ...made_motion import made_face

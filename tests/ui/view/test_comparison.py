@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix
 from scope.scope_addon.scene.build import BuildOptions, build_scene
-from scope.scope_addon.scene.camera import view_number
-from scope.scope_addon.scene.capture_parts import tag_part
+from scope.scope_addon.scene.datablocks import tag_part, view_number
 from scope.scope_addon.ui import comparison
 from scope.scope_addon.ui.view_operators import show_new_capture
 from scope.solver import load_body

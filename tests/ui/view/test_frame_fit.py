@@ -18,7 +18,7 @@ import pytest
 from mathutils import Matrix
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.root_object import move_root_motion_to_object
-from scope.scope_addon.ui import comparison, sidebar
+from scope.scope_addon.ui import comparison, viewports
 from scope.scope_addon.ui.comparison import fit_frame, side_extent, unfit_frame
 from scope.scope_addon.ui.view_operators import hide_startup_cube
 
@@ -244,19 +244,19 @@ def test_the_tab_opens_in_the_largest_viewport_of_a_menu():
     menu = area("TOPBAR", (2000, 2000))
     small = area(size=(100, 100))
     large = area()
-    sidebar.show_tab(context([menu, small, large], menu))
+    viewports.show_tab(context([menu, small, large], menu))
     assert [each.spaces.active.show_region_ui for each in (menu, small, large)] == [
         False,
         False,
         True,
     ]
     assert large.regions[1].tab == "Scope"
-    assert sidebar.viewport_of(context([small, large], small)) is small  # where a file is dropped
+    assert viewports.viewport_of(context([small, large], small)) is small  # where a file is dropped
 
 
 def test_without_a_viewport_or_before_the_first_drawing_nothing_fails():
-    sidebar.show_tab(context([area("TOPBAR")]))
-    sidebar.show_tab(SimpleNamespace(window=None, area=None))
+    viewports.show_tab(context([area("TOPBAR")]))
+    viewports.show_tab(SimpleNamespace(window=None, area=None))
     new = area(drawn=False)
-    sidebar.show_tab(context([new]))
+    viewports.show_tab(context([new]))
     assert new.spaces.active.show_region_ui
