@@ -165,52 +165,35 @@ def capture_clip(
     start = time.monotonic()
     footage = Path(task.footage)
     out = Path(task.out)
-    entry: Entry = {"file": task.file, "name": task.name}
     try:
-        entry["key"] = task.key or clip_key(task.basis, footage, RATE in task.settings.options)
+        key = task.key or clip_key(task.basis, footage, RATE in task.settings.options)
     except OSError as error:
         return failure(task, f"{footage} cannot be read: {error.strerror}")
-    if task.only_key not in ("", entry["key"]):
+    entry: Entry = {"file": task.file, "name": task.name, "key": key}
+    if task.only_key not in ("", key):
         return failure(
             task,
             "it would replace the result of the same name of another folder; give another --out, "
             "or remove the report there if that may be replaced",
         )
-    # on a cluster, results are moved when they are finished
+    # On a cluster, results are moved when they are finished.
     leaves_record = not task.final and not task.windows
-    record = finished_file(out, task.name, entry["key"])
-    if (finished := _finished_before(task, entry, record if leaves_record else None)) is not None:
+    record = finished_file(out, task.name, key) if leaves_record else None
+    if (finished := _finished_before(task, entry, record)) is not None:
         return finished
-    target = out / task.name
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        arguments = [
-            *program,
-            *_arguments(footage, target, task.settings, threads),
-            *_window_arguments(task),
-        ]
-        if leaves_record:
+        (out / task.name).parent.mkdir(parents=True, exist_ok=True)
+        if record is not None:
             remove_finished(out, task.name)
-            arguments.append(f"{FINISHED_FILE}={record}")
-        if task.final:  # a page about the capture shows its command
-            # as text, because a path would take one of the slashes from an address
-            shown = _arguments(
-                footage, f"{task.final.rstrip('/')}/{task.name}", task.settings, threads
-            )
-            if task.address:
-                shown = [each.replace(task.footage, task.address) for each in shown]
-            arguments += [
-                SHOWN_COMMAND,
-                shlex.join([*program, *(each for each in shown if each != STOP_WITH_STDIN)]),
-            ]
-        status, stdout, stderr = run(arguments)
+        status, stdout, stderr = run(_command(task, program, threads, record))
     except OSError as error:
         return entry | failure(task, system_error_message(error))
     entry["seconds"] = round(time.monotonic() - start, 2)
     report = _last_object(stdout)
     try:
-        if status in (0, NO_PERSON) and not task.windows and not _is_unchanged(task, entry["key"]):
-            remove(record)
+        if status in (0, NO_PERSON) and not task.windows and not _is_unchanged(task, key):
+            if record is not None:
+                remove(record)
             return entry | failure(
                 task,
                 "the footage, or a file that the options name, was changed while it was captured; "
@@ -220,11 +203,35 @@ def capture_clip(
             return entry | _outcome(report, out, task.name)
     except OSError as error:
         return entry | failure(task, f"the footage or a result cannot be read again ({error})")
+    message = _error_message(stderr)
     if status == NO_PERSON:
-        return entry | {"status": "no_person", "outputs": [], "message": _error_message(stderr)}
-    return entry | failure(
-        task, _error_message(stderr) or f"the process ended with status {status}"
-    )
+        return entry | {"status": "no_person", "outputs": [], "message": message}
+    return entry | failure(task, message or f"the process ended with status {status}")
+
+
+def _command(
+    task: ClipTask, program: Sequence[str], threads: int | None, record: Path | None
+) -> list[str]:
+    """Return the command that captures a clip.
+
+    :param record: that the process leaves when its results are complete; None: none.
+    """
+    footage = Path(task.footage)
+    target = Path(task.out) / task.name
+    command = [*program, *_arguments(footage, target, task.settings, threads)]
+    # Of a part of a long clip, or of one whose parts were observed before.
+    folder = task.windows_folder or (task.out if task.windows not in ("", COUNT) else "")
+    given = {WINDOWS: task.windows, WINDOWS_FOLDER: folder, FINISHED_FILE: record}
+    command += [f"{option}={value}" for option, value in given.items() if value]
+    if task.final:  # a page about the capture shows its command
+        # As text, because a path would take one of the slashes from an address.
+        shown_target = f"{task.final.rstrip('/')}/{task.name}"
+        shown = _arguments(footage, shown_target, task.settings, threads)
+        if task.address:
+            shown = [each.replace(task.footage, task.address) for each in shown]
+        shown.remove(STOP_WITH_STDIN)
+        command += [SHOWN_COMMAND, shlex.join([*program, *shown])]
+    return command
 
 
 def _finished_before(task: ClipTask, entry: Entry, record: Path | None) -> Entry | None:
@@ -321,15 +328,6 @@ def _arguments(
 
 def _is_picture(path: Path) -> bool:
     return path.suffix.lower() in PICTURE_SUFFIXES and not path.is_dir()
-
-
-def _window_arguments(task: ClipTask) -> list[str]:
-    """Return the arguments for a part of a long clip, or for one whose parts were observed
-    before.
-    """
-    folder = task.windows_folder or (task.out if task.windows not in ("", COUNT) else "")
-    given = {WINDOWS: task.windows, WINDOWS_FOLDER: folder}
-    return [f"{option}={value}" for option, value in given.items() if value]
 
 
 def clip_key(basis: str, footage: Path, rate_given: bool) -> str:
