@@ -208,16 +208,27 @@ def _moved(place: CameraPlace, step: Float64Array, mean_s: float) -> CameraPlace
 
 @dataclass
 class _System:
-    """The normal equations: of cameras and lengths (G, G), of each frame's points (N, 3n, 3n), and
-    between them (N, G, 3n).
-    """
+    """The normal equations H d = -g of cameras and lengths, and of each frame's points."""
 
-    H_global: Float64Array
-    g_global: Float64Array
-    H_points: Float64Array
-    g_points: Float64Array
-    coupling: Float64Array
+    H_global: Float64Array  # (G, G)
+    g_global: Float64Array  # (G,)
+    H_points: Float64Array  # (N, n, 3, n, 3)
+    g_points: Float64Array  # (N, n, 3)
+    coupling: Float64Array  # (N, G, n, 3)
     is_free: BoolArray  # (G,)
+
+    @classmethod
+    def empty(cls, is_free: BoolArray, frames: int, keypoints: int) -> _System:
+        """Return equations of no measurement."""
+        G = len(is_free)
+        return cls(
+            np.zeros((G, G)),
+            np.zeros(G),
+            np.zeros((frames, keypoints, 3, keypoints, 3)),
+            np.zeros((frames, keypoints, 3)),
+            np.zeros((frames, G, keypoints, 3)),
+            is_free,
+        )
 
     def solve(self, damping: float) -> tuple[Float64Array, Float64Array]:
         """Return the steps of cameras and lengths (G,) and of points (N, n, 3)."""
@@ -242,15 +253,17 @@ class _System:
         """Return the Schur complement and its gradient, and the points' steps: by step of a global
         unknown (N, 3n, G), and alone (N, 3n).
         """
-        diagonal = np.einsum("nii->ni", self.H_points)
-        damped = self.H_points.copy()
-        np.einsum("nii->ni", damped)[:] += damping * diagonal + 1e-6
-        both = np.concatenate([np.swapaxes(self.coupling, 1, 2), self.g_points[:, :, None]], axis=2)
+        N, size, n, _ = self.coupling.shape
+        damped = self.H_points.reshape(N, 3 * n, 3 * n).copy()
+        np.einsum("nii->ni", damped)[:] += damping * np.einsum("nii->ni", damped) + 1e-6
+        coupling = self.coupling.reshape(N, size, 3 * n)
+        both = np.concatenate(
+            [np.swapaxes(coupling, 1, 2), self.g_points.reshape(N, 3 * n, 1)], axis=2
+        )
         solved = np.linalg.solve(damped, both)
         from_global = solved[:, :, :-1]
         alone = solved[:, :, -1]
-        size = len(self.g_global)
-        rows = np.swapaxes(self.coupling, 0, 1).reshape(size, -1)
+        rows = np.swapaxes(coupling, 0, 1).reshape(size, -1)
         S = self.H_global + damping * np.diag(np.diag(self.H_global))
         S = S - rows @ from_global.reshape(-1, size)
         return S, self.g_global - rows @ alone.ravel(), from_global, alone
@@ -334,13 +347,8 @@ class _Problem:
     def linearize(self, now: _Unknowns) -> _System:
         """Return the normal equations, by iterated weights."""
         N, n = now.points.shape[:2]
-        size = len(self.is_free)
+        system = _System.empty(self.is_free, N, n)
         rays, confidence = self.observed(now.cameras)
-        H_global = np.zeros((size, size))
-        g_global = np.zeros(size)
-        H_points = np.zeros((N, n, 3, n, 3))
-        g_points = np.zeros((N, n, 3))
-        coupling = np.zeros((N, size, n, 3))
         flat = now.points.reshape(-1, 3)
         each = np.arange(n)
         for v, place in enumerate(now.cameras):
@@ -355,24 +363,18 @@ class _Problem:
             J_point, J_camera = _derivatives(place, flat, speed, since_mean_s)
             weighted_camera = J_camera * weight[:, None, None]
             weighted_point = J_point * weight[:, None, None]
-            H_global[own, own] += np.einsum("mri,mrj->ij", weighted_camera, J_camera)
-            g_global[own] += np.einsum("mri,mr->i", weighted_camera, residual)
+            system.H_global[own, own] += np.einsum("mri,mrj->ij", weighted_camera, J_camera)
+            system.g_global[own] += np.einsum("mri,mr->i", weighted_camera, residual)
             block = np.swapaxes(weighted_point, 1, 2) @ J_point
-            H_points[:, each, :, each, :] += np.swapaxes(block.reshape(N, n, 3, 3), 0, 1)
-            g_points += np.einsum("mrp,mr->mp", weighted_point, residual).reshape(N, n, 3)
+            system.H_points[:, each, :, each, :] += np.swapaxes(block.reshape(N, n, 3, 3), 0, 1)
+            pull = np.einsum("mrp,mr->mp", weighted_point, residual)
+            system.g_points += pull.reshape(N, n, 3)
             between = np.swapaxes(weighted_camera, 1, 2) @ J_point
-            coupling[:, own] += np.swapaxes(between.reshape(N, n, _UNKNOWNS, 3), 1, 2)
+            system.coupling[:, own] += np.swapaxes(between.reshape(N, n, _UNKNOWNS, 3), 1, 2)
         known = (confidence > 0).any(axis=0)
-        self._add_bones(now, known, H_global, g_global, H_points, g_points, coupling)
-        self._add_priors(now, H_global, g_global)
-        return _System(
-            H_global,
-            g_global,
-            H_points.reshape(N, 3 * n, 3 * n),
-            g_points.reshape(N, 3 * n),
-            coupling.reshape(N, size, 3 * n),
-            self.is_free,
-        )
+        self._add_bones(now, known, system)
+        self._add_priors(now, system)
+        return system
 
     def _stretch(self, now: _Unknowns) -> tuple[Float64Array, Float64Array]:
         """Return by how much bones are too long (N, rows), metres of the mean body, and the
@@ -384,41 +386,32 @@ class _Problem:
         stretch = mean * np.log(length / now.lengths[BONE_OF_ROW])
         return stretch, mean[:, None] * bones / np.square(length)[..., None]
 
-    def _add_bones(
-        self,
-        now: _Unknowns,
-        known: BoolArray,
-        H_global: Float64Array,
-        g_global: Float64Array,
-        H_points: Float64Array,
-        g_points: Float64Array,
-        coupling: Float64Array,
-    ) -> None:
+    def _add_bones(self, now: _Unknowns, known: BoolArray, system: _System) -> None:
         """Add what bones say about their lengths, and about the points at their ends."""
         stretch, gradient = self._stretch(now)
         both = known[:, BONE_STARTS] & known[:, BONE_ENDS]
         weight = both / (1.0 + np.square(stretch / BONE_SIGMA_M)) / BONE_SIGMA_M**2
         lengths = len(now.cameras) * _UNKNOWNS + BONE_OF_ROW
         mean = self.mean_lengths[BONE_OF_ROW]
-        np.add.at(H_global, (lengths, lengths), weight.sum(axis=0) * mean**2)
-        np.add.at(g_global, lengths, -(weight * stretch).sum(axis=0) * mean)
+        np.add.at(system.H_global, (lengths, lengths), weight.sum(axis=0) * mean**2)
+        np.add.at(system.g_global, lengths, -(weight * stretch).sum(axis=0) * mean)
         for row, (start, end) in enumerate(zip(BONE_STARTS, BONE_ENDS, strict=True)):
             u = gradient[:, row]
             w = weight[:, row, None]
             block = w[..., None] * u[:, :, None] * u[:, None, :]
-            H_points[:, start, :, start] += block
-            H_points[:, end, :, end] += block
-            H_points[:, start, :, end] -= block
-            H_points[:, end, :, start] -= block
+            system.H_points[:, start, :, start] += block
+            system.H_points[:, end, :, end] += block
+            system.H_points[:, start, :, end] -= block
+            system.H_points[:, end, :, start] -= block
             pull = w * stretch[:, row, None] * u
-            g_points[:, end] += pull
-            g_points[:, start] -= pull
-            coupling[:, lengths[row], end] -= mean[row] * w * u
-            coupling[:, lengths[row], start] += mean[row] * w * u
+            system.g_points[:, end] += pull
+            system.g_points[:, start] -= pull
+            system.coupling[:, lengths[row], end] -= mean[row] * w * u
+            system.coupling[:, lengths[row], start] += mean[row] * w * u
 
-    def _add_priors(self, now: _Unknowns, H_global: Float64Array, g_global: Float64Array) -> None:
-        diagonal = np.zeros(len(g_global))
-        pull = np.zeros(len(g_global))
+    def _add_priors(self, now: _Unknowns, system: _System) -> None:
+        diagonal = np.zeros(len(system.g_global))
+        pull = np.zeros(len(system.g_global))
         for v, (place, start) in enumerate(zip(now.cameras, self.start, strict=True)):
             clock = v * _UNKNOWNS + _CLOCK
             diagonal[clock] = 1.0 / self.clock_sigma_s[v] ** 2
@@ -431,8 +424,8 @@ class _Problem:
         lengths = slice(len(now.cameras) * _UNKNOWNS, None)
         diagonal[lengths] = 1.0 / BONE_PRIOR**2
         pull[lengths] = np.log(now.lengths / self.mean_lengths)
-        H_global += np.diag(diagonal) / _INDEPENDENT
-        g_global += diagonal * pull / _INDEPENDENT
+        system.H_global += np.diag(diagonal) / _INDEPENDENT
+        system.g_global += diagonal * pull / _INDEPENDENT
 
     def _speed(self, v: int, place: CameraPlace) -> Float64Array:
         """Return how fast rays (N, n, 2) move, 1/s."""
