@@ -369,6 +369,8 @@ class Motion:
             and (f.name != "zoom" or self.zoom is not None)
             and (f.name != "scene_starts" or len(self.scene_starts))
         }
+        # On Windows, numpy before 2 would take 32 bits for a Python integer.
+        arrays["footage_rotation"] = arrays["footage_rotation"].astype(np.int64)
         return arrays | self.corrections | self.face | self.views
 
     @classmethod

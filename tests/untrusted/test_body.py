@@ -106,7 +106,11 @@ BROKEN = {
         "must be triangles or quads, but have 5 corners",
     ),
     "text for vertices": ("v_template", np.full((V, 3), "1"), "must hold numbers, but holds <U1"),
-    "numbers for names": ("joint_names", np.arange(N), "must hold text, but holds int64"),
+    "numbers for names": (
+        "joint_names",
+        np.arange(N, dtype=np.int64),
+        "must hold text, but holds int64",
+    ),
     "NaN keypoints": ("keypoint_shapedirs", np.full((M, 3, P), np.nan), "contains NaN or infinity"),
     "uv outside": ("uv_faces", np.full((F, 4), 6), r"points outside 0\.\.5"),
     "uv of other faces": (
