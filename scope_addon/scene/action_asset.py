@@ -13,6 +13,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy.types import Action, Object
 
 from ...solver.errors import InputError
 from ..arrays import Float32Array, Float64Array
@@ -42,9 +43,7 @@ _LIGHT = np.array([-0.45, 0.6, 0.66])  # unit vector towards the light: right, u
 _AMBIENT = 0.4
 
 
-def mark_action(
-    action: bpy.types.Action, author: str = "", description: str = "", catalog: str = ""
-) -> None:
+def mark_action(action: Action, author: str = "", description: str = "", catalog: str = "") -> None:
     """Mark an action as an asset, or change the metadata of one; tags that the user has given it
     stay.
 
@@ -67,7 +66,7 @@ def mark_action(
         data.catalog_id = catalog_id
 
 
-def set_preview(action: bpy.types.Action, armature: bpy.types.Object, frame: float) -> None:
+def set_preview(action: Action, armature: Object, frame: float) -> None:
     """Give an action a preview of an armature's pose at a scene frame.
 
     :param armature: animated by the action.
@@ -158,10 +157,7 @@ def _radius(bone: bpy.types.PoseBone) -> float:
 
 
 def _skeleton_picture(
-    heads: Float64Array,
-    tails: Float64Array,
-    radii: Float64Array,
-    colors: Float64Array,
+    heads: Float64Array, tails: Float64Array, radii: Float64Array, colors: Float64Array
 ) -> Float32Array:
     """Draw bones as capsules on a transparent background.
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import ID, Action, AnimData, FCurve, Key, NlaStrip, Object, Scene
 from bpy_extras import anim_utils
 from numpy.typing import NDArray
 
@@ -45,7 +46,7 @@ def has_slots() -> bool:
     return "slots" in bpy.types.Action.bl_rna.properties
 
 
-def used_slot(animation: bpy.types.AnimData | None) -> str:
+def used_slot(animation: AnimData | None) -> str:
     """Return the identifier of the slot by which a datablock uses its action; empty if there is
     none.
     """
@@ -53,9 +54,7 @@ def used_slot(animation: bpy.types.AnimData | None) -> str:
     return slot.identifier if slot else ""
 
 
-def assign_action(
-    animation: bpy.types.AnimData, action: bpy.types.Action | None, slot: str
-) -> None:
+def assign_action(animation: AnimData, action: Action | None, slot: str) -> None:
     """Let an action animate a datablock, by its slot of an identifier that ``used_slot`` has
     returned; without one, by the slot that Blender chooses.
     """
@@ -68,7 +67,7 @@ def assign_action(
 class Channels:
     """The F-curves of one datablock in one action."""
 
-    def __init__(self, datablock: bpy.types.ID, action: bpy.types.Action) -> None:
+    def __init__(self, datablock: ID, action: Action) -> None:
         """Assign ``action`` to ``datablock`` (an object, a shape-key block, a camera's data, ...).
 
         In a Blender with slots, one action may serve several datablocks; otherwise, the second
@@ -90,7 +89,7 @@ class Channels:
         self._groups: dict[str, bpy.types.ActionGroup] = {}
 
     @classmethod
-    def of(cls, datablock: bpy.types.ID) -> Channels:
+    def of(cls, datablock: ID) -> Channels:
         """Return the F-curves of a datablock in its action, to add some to them."""
         animation = datablock.animation_data
         if has_slots() and animation.action_slot is None:
@@ -115,7 +114,7 @@ class Channels:
         values: Float64Array,
         interpolation: str = "LINEAR",
         group: str = "",
-    ) -> list[bpy.types.FCurve]:
+    ) -> list[FCurve]:
         """Write the keys of one property and return its curves, one per column.
 
         :param data_path: RNA path from the datablock, e.g. from ``bone_path``.
@@ -140,7 +139,7 @@ class Channels:
         return self._groups[name]
 
 
-def _channelbag(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> bpy.types.ActionChannelbag:
+def _channelbag(action: Action, slot: bpy.types.ActionSlot) -> bpy.types.ActionChannelbag:
     """Return the F-curves of a slot, in a Blender with slots."""
     layer = action.layers[0] if action.layers else action.layers.new("Layer")
     strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
@@ -166,7 +165,7 @@ def shape_key_path(key_name: str) -> str:
     return f'key_blocks["{bpy.utils.escape_identifier(key_name)}"].value'
 
 
-def fcurves(datablock: bpy.types.ID) -> list[bpy.types.FCurve]:
+def fcurves(datablock: ID) -> list[FCurve]:
     """Return the F-curves that animate a datablock, in any supported Blender."""
     action = action_of(datablock)
     if action is None:
@@ -174,15 +173,13 @@ def fcurves(datablock: bpy.types.ID) -> list[bpy.types.FCurve]:
     return fcurves_in_slot(action, getattr(datablock.animation_data, "action_slot", None))
 
 
-def fcurves_in_slot(
-    action: bpy.types.Action, slot: bpy.types.ActionSlot | None
-) -> list[bpy.types.FCurve]:
+def fcurves_in_slot(action: Action, slot: bpy.types.ActionSlot | None) -> list[FCurve]:
     """Return the F-curves in a slot of an action, none without a slot; in a Blender without slots,
     every F-curve.
     """
     if not has_slots():
         return list(action.fcurves)
-    found: list[bpy.types.FCurve] = []
+    found: list[FCurve] = []
     for layer in action.layers:
         for strip in layer.strips:
             bag = strip.channelbag(slot) if slot else None
@@ -190,7 +187,7 @@ def fcurves_in_slot(
     return found
 
 
-def fcurves_of(action: bpy.types.Action) -> list[bpy.types.FCurve]:
+def fcurves_of(action: Action) -> list[FCurve]:
     """Return every F-curve of an action, whatever it animates, in any supported Blender."""
     if not has_slots():
         return list(action.fcurves)
@@ -198,14 +195,14 @@ def fcurves_of(action: bpy.types.Action) -> list[bpy.types.FCurve]:
     return [curve for strip in strips for bag in strip.channelbags for curve in bag.fcurves]
 
 
-def read_keys(curve: bpy.types.FCurve) -> Float32Array:
+def read_keys(curve: FCurve) -> Float32Array:
     """Return (T, 2): frame and value of each key."""
     coordinates = np.empty(2 * len(curve.keyframe_points), np.float32)
     curve.keyframe_points.foreach_get("co", coordinates)
     return coordinates.reshape(-1, 2)
 
 
-def values_between_keys(curve: bpy.types.FCurve, frames: Float64Array) -> Float64Array:
+def values_between_keys(curve: FCurve, frames: Float64Array) -> Float64Array:
     """Evaluate a curve at frames (T,) as its keys and their repetition have it, without its other
     modifiers: these are added to whatever keys are written from the values.
     """
@@ -214,10 +211,7 @@ def values_between_keys(curve: bpy.types.FCurve, frames: Float64Array) -> Float6
 
 
 def rewrite_keys(
-    curve: bpy.types.FCurve,
-    frames: Float64Array,
-    values: Float64Array,
-    interpolation: str = "LINEAR",
+    curve: FCurve, frames: Float64Array, values: Float64Array, interpolation: str = "LINEAR"
 ) -> None:
     """Replace the keys of a curve.
 
@@ -233,7 +227,7 @@ def rewrite_keys(
     curve.update()
 
 
-def change_keys(curve: bpy.types.FCurve, frames: Float64Array, values: Float64Array) -> None:
+def change_keys(curve: FCurve, frames: Float64Array, values: Float64Array) -> None:
     """Change the values of a curve's keys at some frames, and add those that are missing; other
     keys stay as they are.
 
@@ -257,7 +251,7 @@ def change_keys(curve: bpy.types.FCurve, frames: Float64Array, values: Float64Ar
     curve.update()
 
 
-def _insert_keys(curve: bpy.types.FCurve, new: Float32Array) -> None:
+def _insert_keys(curve: FCurve, new: Float32Array) -> None:
     """Insert keys (N, 2), frame and value, in linear time: Blender moves all later ones for each
     key that it inserts.
 
@@ -279,7 +273,7 @@ def _insert_keys(curve: bpy.types.FCurve, new: Float32Array) -> None:
     write_whole_keys(curve, whole)
 
 
-def read_whole_keys(curve: bpy.types.FCurve) -> dict[str, NDArray[Any]]:
+def read_whole_keys(curve: FCurve) -> dict[str, NDArray[Any]]:
     """Return every property of a curve's keys by its name, (T, n)."""
     keys = curve.keyframe_points
     found = {name: np.empty((len(keys), count), kind) for name, count, kind in _KEY}
@@ -288,7 +282,7 @@ def read_whole_keys(curve: bpy.types.FCurve) -> dict[str, NDArray[Any]]:
     return found
 
 
-def write_whole_keys(curve: bpy.types.FCurve, whole: dict[str, NDArray[Any]]) -> None:
+def write_whole_keys(curve: FCurve, whole: dict[str, NDArray[Any]]) -> None:
     """Replace the keys of a curve by those with these properties (T, n), in their frames' order."""
     keys = curve.keyframe_points
     keys.clear()
@@ -298,7 +292,7 @@ def write_whole_keys(curve: bpy.types.FCurve, whole: dict[str, NDArray[Any]]) ->
     curve.update()
 
 
-def add_cycles(datablock: bpy.types.ID, offset_curves: set[tuple[str, int]] | None = None) -> None:
+def add_cycles(datablock: ID, offset_curves: set[tuple[str, int]] | None = None) -> None:
     """Make every curve of a datablock cyclic; its other modifiers stay, after the cycles, which
     must come first.
 
@@ -314,25 +308,25 @@ def add_cycles(datablock: bpy.types.ID, offset_curves: set[tuple[str, int]] | No
         repeat_curve(curve, mode)
 
 
-def repeat_curve(curve: bpy.types.FCurve, mode: str = "REPEAT") -> None:
+def repeat_curve(curve: FCurve, mode: str = "REPEAT") -> None:
     """Make a curve without cycles cyclic."""
     cycles = {"type": "CYCLES", "mode_before": mode, "mode_after": mode}
     write_modifiers(curve, [cycles, *read_modifiers(curve)])
 
 
-def is_cyclic(datablock: bpy.types.ID) -> bool:
+def is_cyclic(datablock: ID) -> bool:
     """Return whether a curve of a datablock repeats."""
     return any(m.type == "CYCLES" for curve in fcurves(datablock) for m in curve.modifiers)
 
 
-def remove_cycles(datablock: bpy.types.ID) -> None:
+def remove_cycles(datablock: ID) -> None:
     """Remove the cycles from every curve of a datablock."""
     for curve in fcurves(datablock):
         for modifier in [m for m in curve.modifiers if m.type == "CYCLES"]:
             curve.modifiers.remove(modifier)
 
 
-def nla_strips(datablock: bpy.types.ID) -> list[bpy.types.NlaStrip]:
+def nla_strips(datablock: ID) -> list[NlaStrip]:
     """Return the NLA strips in effect for a datablock; none in Tweak Mode, where one strip plays
     alone.
     """
@@ -346,9 +340,7 @@ def nla_strips(datablock: bpy.types.ID) -> list[bpy.types.NlaStrip]:
     return [strip for track in tracks for strip in track.strips if not strip.mute]
 
 
-def animated_together(
-    armature: bpy.types.Object, root: bpy.types.Object | None
-) -> list[bpy.types.ID]:
+def animated_together(armature: Object, root: Object | None) -> list[ID]:
     """Return an armature with an action, and of its root object and the shape keys of its meshes
     those that move.
     """
@@ -361,7 +353,7 @@ def animated_together(
     return [armature, *moving]
 
 
-def push_to_nla(datablock: bpy.types.ID) -> bpy.types.NlaStrip:
+def push_to_nla(datablock: ID) -> NlaStrip:
     """Move the action of a datablock to a strip on a new NLA track, at the frames of its keys.
 
     :param datablock: with an action, and not in the NLA's Tweak Mode.
@@ -382,7 +374,7 @@ def push_to_nla(datablock: bpy.types.ID) -> bpy.types.NlaStrip:
     return strip
 
 
-def check_not_in_nla(datablock: bpy.types.ID) -> None:
+def check_not_in_nla(datablock: ID) -> None:
     """Check that keys that are missing in the action of a datablock are not in its NLA, where they
     are not read.
 
@@ -399,7 +391,7 @@ def check_not_in_nla(datablock: bpy.types.ID) -> None:
         )
 
 
-def check_not_moved_by_nla(datablock: bpy.types.ID) -> None:
+def check_not_moved_by_nla(datablock: ID) -> None:
     """Check that the NLA plays the keys of a datablock at their own frames.
 
     :raises UsageError: it is in Tweak Mode, on a strip that is elsewhere or plays at another speed.
@@ -419,7 +411,7 @@ def check_not_moved_by_nla(datablock: bpy.types.ID) -> None:
 
 
 @contextmanager
-def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
+def nla_as_actions(scene: Scene) -> Iterator[None]:
     """Bake the NLA of the scene's objects and shape keys to new actions for the duration of the
     block, on whole frames.
     """
@@ -463,9 +455,7 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
             animation.action_blend_type = blend_type
 
 
-def shape_key_values(
-    scene: bpy.types.Scene, shaped: Iterable[bpy.types.Key], frames: range
-) -> dict[bpy.types.Key, Float32Array]:
+def shape_key_values(scene: Scene, shaped: Iterable[Key], frames: range) -> dict[Key, Float32Array]:
     """Return the values (T, keys), without the basis, that shape keys show at T scene frames."""
     shown = {keys: np.empty((len(frames), len(keys.key_blocks) - 1), np.float32) for keys in shaped}
     for row, frame in enumerate(frames if shown else ()):
@@ -476,14 +466,14 @@ def shape_key_values(
     return shown
 
 
-def key_shape_keys(keys: bpy.types.Key, frames: range, values: Float32Array) -> None:
+def key_shape_keys(keys: Key, frames: range, values: Float32Array) -> None:
     """Give shape keys an action with the values of ``shape_key_values``."""
     channels = Channels(keys, bpy.data.actions.new(keys.name))
     for name, column in zip(keys.key_blocks.keys()[1:], values.T, strict=True):
         channels.write(shape_key_path(name), np.array(frames, float), column)
 
 
-def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | None:
+def frame_range(datablocks: Iterable[ID]) -> tuple[float, float] | None:
     """Return the first and last keyed frame over the datablocks' curves and NLA strips; None
     without keys.
 
@@ -510,7 +500,7 @@ def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | Non
     return min(s[0] for s in spans), max(s[1] for s in spans)
 
 
-def _is_replaced(strip: bpy.types.NlaStrip, datablock: bpy.types.ID) -> bool:
+def _is_replaced(strip: NlaStrip, datablock: ID) -> bool:
     """Return whether a datablock's active action replaces all that moves in an NLA strip."""
     animation = datablock.animation_data
     replaces = (
@@ -529,12 +519,12 @@ def _is_replaced(strip: bpy.types.NlaStrip, datablock: bpy.types.ID) -> bool:
     return all((curve.data_path, curve.array_index) in own for curve in moving)
 
 
-def read_modifiers(curve: bpy.types.FCurve) -> list[dict[str, Any]]:
+def read_modifiers(curve: FCurve) -> list[dict[str, Any]]:
     """Return the type and the settings of each modifier of a curve."""
     return [{"type": modifier.type, **_settings(modifier)} for modifier in curve.modifiers]
 
 
-def write_modifiers(curve: bpy.types.FCurve, wanted: list[dict[str, Any]]) -> None:
+def write_modifiers(curve: FCurve, wanted: list[dict[str, Any]]) -> None:
     """Replace the modifiers of a curve.
 
     :param wanted: from ``read_modifiers``. Cycles must come first, if at all.

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import MotionFileError, OutputError
 
 if TYPE_CHECKING:
-    import bpy
+    from bpy.types import Object, Scene
 
     from ..motion import Motion
 
@@ -79,7 +79,7 @@ def check_last_frame(frame: float) -> None:
         )
 
 
-def check_samples(scene: bpy.types.Scene, rigs: Sequence[bpy.types.Object]) -> None:
+def check_samples(scene: Scene, rigs: Sequence[Object]) -> None:
     """Refuse to sample every bone of rigs at every frame of a scene, if that needs far more memory
     than the movement of their keys explains: few keys that years lie between, or a still motion on
     a rig of thousands of bones.

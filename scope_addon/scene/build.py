@@ -13,6 +13,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy.types import ID, Collection, Object, Scene
 
 from ...solver.body import Body
 from ..arrays import BoolArray, Float64Array
@@ -98,9 +99,9 @@ NEW_SCENE = BuildOptions(frame_rate="set", resolution="set", active_camera=True)
 class Person:
     """The objects of one motion."""
 
-    armature: bpy.types.Object
-    mesh: bpy.types.Object
-    camera: bpy.types.Object | None
+    armature: Object
+    mesh: Object
+    camera: Object | None
     motion: Motion = field(repr=False)
     frames: Float64Array = field(repr=False)  # (T,) scene frame of each pose
     under_floor: BoolArray = field(repr=False)  # (T,) poses with a foot under the floor
@@ -110,7 +111,7 @@ class Person:
 class BuildResult:
     """The result of ``build_scene``."""
 
-    collection: bpy.types.Collection
+    collection: Collection
     people: list[Person]
     frame_rate: float  # of the scene, frames per second
     frame_range: tuple[float, float]  # first and last key
@@ -147,7 +148,7 @@ def build_scene(
 
 
 def _build(
-    scene: bpy.types.Scene,
+    scene: Scene,
     motions: list[Motion],
     body: Body,
     footage: str | Path | None,
@@ -201,9 +202,7 @@ def _face_warnings(motions: list[Motion], body: Body) -> list[Notice]:
     return [notice("no_expressions", body=body.name)]
 
 
-def _set_frame_range(
-    scene: bpy.types.Scene, collection: bpy.types.Collection, first: float, last: float
-) -> None:
+def _set_frame_range(scene: Scene, collection: Collection, first: float, last: float) -> None:
     """Set the scene's frame range to a capture's, together with that of the captures before."""
     if captures_of(scene) != [collection]:
         first = min(first, scene.frame_start)
@@ -215,7 +214,7 @@ def _build_person(
     label: str,
     motion: Motion,
     body: Body,
-    collection: bpy.types.Collection,
+    collection: Collection,
     rate: float,
     options: BuildOptions,
 ) -> Person:
@@ -263,7 +262,7 @@ def _build_person(
 def _build_cameras(
     name: str,
     people: list[Person],
-    collection: bpy.types.Collection,
+    collection: Collection,
     footage: str | Path | None,
     options: BuildOptions,
 ) -> list[Notice]:
@@ -289,10 +288,7 @@ def _build_cameras(
 
 
 def _build_views(
-    name: str,
-    person: Person,
-    collection: bpy.types.Collection,
-    footage: Sequence[str | Path | None],
+    name: str, person: Person, collection: Collection, footage: Sequence[str | Path | None]
 ) -> list[Notice]:
     """Create the further cameras of a person's motion; return warnings."""
     warnings: list[Notice] = []
@@ -331,7 +327,7 @@ def _check(motion: Motion, body: Body) -> None:
     check_content(motion)
 
 
-def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
+def delete_capture(scene: Scene, collection: Collection) -> None:
     """Remove a capture's people, camera, footage, actions and markers, and its collection.
 
     Objects of the user's in the collection stay where they are, in each scene's own collection if
@@ -361,7 +357,7 @@ def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
 
 
 @contextmanager
-def names_free(collection: bpy.types.Collection) -> Iterator[None]:
+def names_free(collection: Collection) -> Iterator[None]:
     """Give a capture other names inside the block, so that a second one built there gets the same
     names without Blender's numbers.
     """
@@ -377,7 +373,7 @@ def names_free(collection: bpy.types.Collection) -> Iterator[None]:
             block.name = name
 
 
-def _keep_in_scenes(obj: bpy.types.Object, collections: Sequence[bpy.types.Collection]) -> None:
+def _keep_in_scenes(obj: Object, collections: Sequence[Collection]) -> None:
     """Keep an object in its scenes when some collections are removed."""
     others = set(obj.users_collection) - set(collections)
     for scene in obj.users_scene:
@@ -387,16 +383,16 @@ def _keep_in_scenes(obj: bpy.types.Object, collections: Sequence[bpy.types.Colle
             scene.collection.objects.link(obj)
 
 
-def _is_kept(block: bpy.types.ID) -> bool:
+def _is_kept(block: ID) -> bool:
     """Return whether the user keeps a datablock, also without a use."""
     return block.asset_data is not None or (block.use_fake_user and not is_part(block))
 
 
-def _data_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.ID]:
+def _data_of(objects: Iterable[Object]) -> list[ID]:
     """Return the local data that objects use: meshes, armatures, cameras, materials, footage and
     actions.
     """
-    found: list[bpy.types.ID | None] = []
+    found: list[ID | None] = []
     for obj in objects:
         data = obj.data
         found += [data, *(slot.material for slot in obj.material_slots)]
@@ -409,7 +405,7 @@ def _data_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.ID]:
     return [block for block in dict.fromkeys(found) if block is not None and block.library is None]
 
 
-def _remove_markers(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
+def _remove_markers(scene: Scene, collection: Collection) -> None:
     """Remove the markers at a capture's review spans, where the user has left them as they were."""
     names = collection.get(MARKERS)
     for name in names.split("\n") if isinstance(names, str) else ():

@@ -28,6 +28,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy.types import ID, CameraBackgroundImage, Collection, Object, Scene
 
 from ...solver.rotations import quaternion_from_matrix
 from ..arrays import Float64Array
@@ -71,14 +72,14 @@ def _footage_aspect(motion: Motion) -> tuple[float, float]:
     return (x, y) if motion.view.is_upright else (y, x)
 
 
-def store_resolution(owner: bpy.types.ID, motion: Motion) -> None:
+def store_resolution(owner: ID, motion: Motion) -> None:
     """Store the size and pixel aspect of the footage in a capture's collection, or in one of its
     further cameras.
     """
     owner[_PICTURE] = [*(float(n) for n in motion.image_size), *pixel_aspect(motion)]
 
 
-def set_resolution(scene: bpy.types.Scene, owner: bpy.types.ID) -> None:
+def set_resolution(scene: Scene, owner: ID) -> None:
     """Set the scene's resolution and pixel aspect to those of the footage, if a capture's
     collection, or one of its further cameras, stores them.
     """
@@ -93,9 +94,7 @@ def set_resolution(scene: bpy.types.Scene, owner: bpy.types.ID) -> None:
     scene.render.pixel_aspect_y = aspect_y
 
 
-def build_camera(
-    name: str, motion: Motion, collection: bpy.types.Collection, frames: Float64Array
-) -> bpy.types.Object:
+def build_camera(name: str, motion: Motion, collection: Collection, frames: Float64Array) -> Object:
     """Create a camera object with the intrinsics and the pose of the footage's camera.
 
     :param frames: (T,) scene frame of each pose; a camera that moves or zooms is keyed there.
@@ -122,12 +121,8 @@ def build_camera(
 
 
 def build_view(
-    name: str,
-    motion: Motion,
-    number: int,
-    collection: bpy.types.Collection,
-    frames: Float64Array,
-) -> bpy.types.Object:
+    name: str, motion: Motion, number: int, collection: Collection, frames: Float64Array
+) -> Object:
     """Create the camera object of a further camera of a motion.
 
     :param number: of the camera, see `Motion.from_view`. :param frames: (T,) as of `build_camera`.
@@ -173,7 +168,7 @@ def same_camera(a: Motion, b: Motion) -> bool:
 
 
 def show_footage(
-    camera: bpy.types.Object, footage: str | Path, motion: Motion, frames: Float64Array
+    camera: Object, footage: str | Path, motion: Motion, frames: Float64Array
 ) -> list[Notice]:
     """Show the footage as the camera's background, in step with the poses.
 
@@ -233,7 +228,7 @@ def _from_raw_picture(motion: Motion, picture: Path) -> Motion:
     return replace(motion, footage_rotation=view.clockwise_deg, footage_mirrored=view.is_mirrored)
 
 
-def _turn(background: bpy.types.CameraBackgroundImage, motion: Motion) -> None:
+def _turn(background: CameraBackgroundImage, motion: Motion) -> None:
     """Show the footage as it was turned and mirrored for the capture.
 
     Blender fits the picture into the frame before it turns it, and exchanges its sides before that.
@@ -249,8 +244,8 @@ def _turn(background: bpy.types.CameraBackgroundImage, motion: Motion) -> None:
 
 
 def _show_picture(
-    camera: bpy.types.Object,
-    background: bpy.types.CameraBackgroundImage,
+    camera: Object,
+    background: CameraBackgroundImage,
     path: Path,
     motion: Motion,
     frames: Float64Array,
@@ -265,8 +260,8 @@ def _show_picture(
 
 
 def _show_clip(
-    camera: bpy.types.Object,
-    background: bpy.types.CameraBackgroundImage,
+    camera: Object,
+    background: CameraBackgroundImage,
     path: Path,
     motion: Motion,
     frames: Float64Array,
@@ -287,9 +282,7 @@ def _show_clip(
     return size, [notice("footage_drifts", frames=drift)]
 
 
-def show_footage_again(
-    camera: bpy.types.Object, motion: Motion, frames: Float64Array
-) -> list[Notice]:
+def show_footage_again(camera: Object, motion: Motion, frames: Float64Array) -> list[Notice]:
     """Show the camera's footage in step with poses that were moved in time; keep how opaque it is.
 
     :param frames: (T,) scene frame of each pose.
@@ -349,8 +342,8 @@ def _drift(shown: Float64Array, frames: Float64Array) -> float:
 
 
 def _show_video(
-    camera: bpy.types.Object,
-    background: bpy.types.CameraBackgroundImage,
+    camera: Object,
+    background: CameraBackgroundImage,
     path: Path,
     motion: Motion,
     frames: Float64Array,
@@ -381,8 +374,8 @@ def _show_video(
 
 
 def _show_picture_sequence(
-    camera: bpy.types.Object,
-    background: bpy.types.CameraBackgroundImage,
+    camera: Object,
+    background: CameraBackgroundImage,
     first: Path,
     motion: Motion,
     frames: Float64Array,
@@ -410,8 +403,8 @@ def _show_picture_sequence(
 
 
 def _key_footage(
-    camera: bpy.types.Object,
-    background: bpy.types.CameraBackgroundImage,
+    camera: Object,
+    background: CameraBackgroundImage,
     scene_frames: Float64Array,
     shown: Float64Array,
 ) -> None:
@@ -450,7 +443,7 @@ def _show_frames(user: bpy.types.ImageUser, start: int) -> None:
 
 
 def _set_lens_distortion(
-    clip: bpy.types.MovieClip, background: bpy.types.CameraBackgroundImage, motion: Motion
+    clip: bpy.types.MovieClip, background: CameraBackgroundImage, motion: Motion
 ) -> None:
     """Set the clip's lens, and show it undistorted: Blender's cameras are pinholes.
 

@@ -14,6 +14,7 @@ from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
 import bpy
+from bpy.types import ID, Action, Collection, Key, Object, Scene, ViewLayer
 
 from ..errors import UsageError
 
@@ -49,7 +50,7 @@ def short_name(name: str) -> str:
     return name.encode("utf-8", "replace")[: _LONGEST - SUFFIX_BYTES].decode("utf-8", "ignore")
 
 
-def holds(collection: bpy.types.Collection, obj: bpy.types.Object) -> bool:
+def holds(collection: Collection, obj: Object) -> bool:
     """Return whether an object is in a collection or in one below it.
 
     Looking it up by its name alone would also find an object of that name which is linked from
@@ -58,62 +59,62 @@ def holds(collection: bpy.types.Collection, obj: bpy.types.Object) -> bool:
     return _contains(collection.all_objects, obj)
 
 
-def is_in_layer(view_layer: bpy.types.ViewLayer, obj: bpy.types.Object) -> bool:
+def is_in_layer(view_layer: ViewLayer, obj: Object) -> bool:
     """Return whether an object is in a view layer, found as in `holds`."""
     return _contains(view_layer.objects, obj)
 
 
-def _contains(objects: bpy.types.bpy_prop_collection, obj: bpy.types.Object) -> bool:
+def _contains(objects: bpy.types.bpy_prop_collection, obj: Object) -> bool:
     # the panel asks at every redraw, and only a namesake needs the whole scene
     named = objects.get(obj.name)
     return named == obj or (named is not None and any(each == obj for each in objects))
 
 
-def captures_of(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
+def captures_of(scene: Scene) -> list[Collection]:
     """Return the collections of a scene that contain captures, the last added last."""
     return [each for each in scene.collection.children_recursive if CAPTURE_TAG in each]
 
 
-def is_person(obj: bpy.types.Object) -> bool:
+def is_person(obj: Object) -> bool:
     """Return whether an object is the armature of a captured person."""
     return SOURCE_TAG in obj
 
 
-def is_part(block: bpy.types.ID) -> bool:
+def is_part(block: ID) -> bool:
     """Return whether a body, camera or action was made for a capture."""
     return PART_TAG in block
 
 
-def action_of(block: bpy.types.ID) -> bpy.types.Action | None:
+def action_of(block: ID) -> Action | None:
     """Return the action that animates a datablock; None without one."""
     animation = getattr(block, "animation_data", None)
     return animation.action if animation is not None else None
 
 
-def with_data(obj: bpy.types.Object) -> list[bpy.types.ID]:
+def with_data(obj: Object) -> list[ID]:
     """Return an object, its data and the shape keys of that, as far as it has them."""
     found = [obj, obj.data, getattr(obj.data, "shape_keys", None)]
     return [block for block in found if block is not None]
 
 
-def view_number(camera: bpy.types.Object) -> int | None:
+def view_number(camera: Object) -> int | None:
     """Return the number of a capture's further camera; None of its first one."""
     number = camera.get(VIEW_TAG)
     return number if isinstance(number, int) else None
 
 
-def shape_keys_of(armature: bpy.types.Object) -> list[bpy.types.Key]:
+def shape_keys_of(armature: Object) -> list[Key]:
     """Return the shape keys of the meshes below an armature, each once."""
     meshes = [obj.data for obj in armature.children_recursive if obj.type == "MESH"]
     return list(dict.fromkeys(mesh.shape_keys for mesh in meshes if mesh.shape_keys))
 
 
-def is_deformed_by(obj: bpy.types.Object, rig: bpy.types.Object) -> bool:
+def is_deformed_by(obj: Object, rig: Object) -> bool:
     """Return whether a modifier of an object deforms it with an armature."""
     return any(m.type == "ARMATURE" and m.object == rig for m in obj.modifiers)
 
 
-def enter_object_mode(view_layer: bpy.types.ViewLayer | None) -> None:
+def enter_object_mode(view_layer: ViewLayer | None) -> None:
     """Leave the mode of a view layer's active object, such as Edit Mode, if there is one: neither
     can such an object be removed, nor another one be selected or edited.
     """
@@ -122,7 +123,7 @@ def enter_object_mode(view_layer: bpy.types.ViewLayer | None) -> None:
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def check_local(scene: bpy.types.Scene) -> None:
+def check_local(scene: Scene) -> None:
     """Check that a scene is stored in this file.
 
     :raises UsageError: it is linked from another one.
@@ -148,7 +149,7 @@ def changed(structs: Iterable[Any], **values: Any) -> Iterator[None]:
             setattr(struct, name, value)
 
 
-def modifiers_off(objects: Iterable[bpy.types.Object]) -> AbstractContextManager[None]:
+def modifiers_off(objects: Iterable[Object]) -> AbstractContextManager[None]:
     """Leave out all modifiers of objects but armatures inside the block: evaluating them, as of a
     subdivided mesh, can take longer than everything else in a frame.
     """
@@ -164,7 +165,7 @@ class NewDatablocks:
             kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in _KINDS
         }
 
-    def all(self) -> list[tuple[str, bpy.types.ID]]:
+    def all(self) -> list[tuple[str, ID]]:
         """Return each with its kind, in the order of the kinds."""
         blocks = ((kind, block) for kind in self._before for block in getattr(bpy.data, kind))
         return [
@@ -204,26 +205,21 @@ def temporary_datablocks(*, used: bool = True) -> Iterator[None]:
             new.remove_unused()
 
 
-def remove_blocks(blocks: Sequence[bpy.types.ID]) -> None:
+def remove_blocks(blocks: Sequence[ID]) -> None:
     """Remove datablocks, and update the scenes that had the objects among them.
 
     Blender updates only the scenes that a window shows. The dependency graph of a scene that was
     shown before goes on pointing to removed objects, and Blender 4.3 crashes when it reads them
     there to free unused drawing data.
     """
-    scenes = {
-        scene
-        for block in blocks
-        if isinstance(block, bpy.types.Object)
-        for scene in block.users_scene
-    }
+    scenes = {scene for block in blocks if isinstance(block, Object) for scene in block.users_scene}
     bpy.data.batch_remove(blocks)
     for scene in scenes:
         for layer in scene.view_layers:
             layer.update()
 
 
-def found(kind: str, name: str, uid: int) -> bpy.types.ID | None:
+def found(kind: str, name: str, uid: int) -> ID | None:
     """Return the datablock with a session's identifier; None if it was removed.
 
     :param kind: the collection of ``bpy.data``.
@@ -236,7 +232,7 @@ def found(kind: str, name: str, uid: int) -> bpy.types.ID | None:
     return next((block for block in blocks if block.session_uid == uid), None)
 
 
-def scene_of(uid: int) -> bpy.types.Scene:
+def scene_of(uid: int) -> Scene:
     """Return the scene with a session's identifier.
 
     :raises UsageError: it was removed.
@@ -255,12 +251,12 @@ def remove(blocks: set[tuple[str, int]]) -> None:
     bpy.context.view_layer.update()  # it would still list removed objects
 
 
-def tag_part(block: bpy.types.ID) -> None:
+def tag_part(block: ID) -> None:
     """Mark a body, camera or action as made for the capture whose collection it is in."""
     block[PART_TAG] = True
 
 
-def cameras_in(collection: bpy.types.Collection) -> list[bpy.types.Object]:
+def cameras_in(collection: Collection) -> list[Object]:
     """Return the cameras of a capture: of the first videos of its clips, and then the further ones
     by their numbers.
     """
@@ -268,24 +264,24 @@ def cameras_in(collection: bpy.types.Collection) -> list[bpy.types.Object]:
     return sorted(cameras, key=_place_of)
 
 
-def cameras_of_clip(collection: bpy.types.Collection) -> list[bpy.types.Object]:
+def cameras_of_clip(collection: Collection) -> list[Object]:
     """Return the camera of a capture's first video, if it is there, and the further ones."""
     cameras = cameras_in(collection)
     first = [camera for camera in cameras if view_number(camera) is None]
     return [*first[:1], *cameras[len(first) :]]
 
 
-def parts_of(collection: bpy.types.Collection) -> list[bpy.types.Object]:
+def parts_of(collection: Collection) -> list[Object]:
     """Return the people of a capture, their bodies and root objects, and its cameras."""
     return [obj for obj in collection.all_objects if _is_of_capture(obj)]
 
 
-def _place_of(camera: bpy.types.Object) -> int:
+def _place_of(camera: Object) -> int:
     number = view_number(camera)
     return -1 if number is None else number
 
 
-def _is_of_capture(obj: bpy.types.Object) -> bool:
+def _is_of_capture(obj: Object) -> bool:
     if ROOT_TAG in obj:  # which a rig that the motion was retargeted to may have, too
         return not obj.children or any(map(is_person, obj.children_recursive))
     return is_person(obj) or is_part(obj)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.types import Action, Key, Object
 from mathutils import Matrix
 
 from ..arrays import Float64Array
@@ -65,7 +66,7 @@ class CapturedExpressions:
     repeat: bool = False
 
 
-def captured_expressions(armature: bpy.types.Object) -> CapturedExpressions | None:
+def captured_expressions(armature: Object) -> CapturedExpressions | None:
     """Return the expressions that the captured armature's body shows; None if its face was not
     captured.
 
@@ -96,7 +97,7 @@ def captured_expressions(armature: bpy.types.Object) -> CapturedExpressions | No
     return None
 
 
-def faces_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+def faces_of(objects: Iterable[Object]) -> list[Object]:
     """Return the meshes with shape keys, one of those that share their data."""
     found = {
         obj.data: obj for obj in objects if obj.type == "MESH" and obj.data.shape_keys is not None
@@ -104,7 +105,7 @@ def faces_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     return list(found.values())
 
 
-def key_names(faces: Iterable[bpy.types.Object]) -> list[str]:
+def key_names(faces: Iterable[Object]) -> list[str]:
     """Return the names of all shape keys of meshes but the basis, each once."""
     blocks = (block for face in faces for block in face.data.shape_keys.key_blocks[1:])
     return list(dict.fromkeys(block.name for block in blocks))
@@ -112,10 +113,10 @@ def key_names(faces: Iterable[bpy.types.Object]) -> list[str]:
 
 def retarget_expressions(
     captured: CapturedExpressions,
-    faces: Sequence[bpy.types.Object],
+    faces: Sequence[Object],
     expression_map: ExpressionMap | None = None,
     name: str = "Face",
-) -> list[bpy.types.Action]:
+) -> list[Action]:
     """Key the shape keys of meshes in new actions so that they show the captured expressions.
 
     A mesh's former action is kept in the file, unless it is an earlier retargeting of the same
@@ -155,7 +156,7 @@ def retarget_expressions(
 
 
 def driven_keys(
-    faces: Iterable[bpy.types.Object], expression_map: ExpressionMap | None = None
+    faces: Iterable[Object], expression_map: ExpressionMap | None = None
 ) -> list[Notice]:
     """Return warnings about mapped shape keys that do not show their keyframes, because drivers
     move them.
@@ -175,11 +176,8 @@ def driven_keys(
 
 
 def _write(
-    keys: bpy.types.Key,
-    captured: CapturedExpressions,
-    values: dict[str, Float64Array],
-    source: str,
-) -> tuple[bpy.types.Action, bpy.types.Action | None]:
+    keys: Key, captured: CapturedExpressions, values: dict[str, Float64Array], source: str
+) -> tuple[Action, Action | None]:
     """Write the keys of one mesh; return the new action and the former one."""
     former = action_of(keys)
     channels = Channels(keys, bpy.data.actions.new("Face"))
@@ -208,29 +206,26 @@ class FaceKeys:
     repeat: bool = False
 
 
-def has_bone_face(rig: bpy.types.Object) -> bool:
+def has_bone_face(rig: Object) -> bool:
     """Return whether bones move the face of an armature, and Scope knows which."""
     return rig.type == "ARMATURE" and has_face_controls(rig.data.bones.keys())
 
 
-def only_bones_move(rig: bpy.types.Object, meshes: Iterable[bpy.types.Object]) -> bool:
+def only_bones_move(rig: Object, meshes: Iterable[Object]) -> bool:
     """Return whether bones move the face of an armature, and no shape keys of its meshes with names
     that are known.
     """
     return has_bone_face(rig) and not guess_expression_map(key_names(meshes)).keys
 
 
-def guess_face_bones(rig: bpy.types.Object) -> ExpressionMap:
+def guess_face_bones(rig: Object) -> ExpressionMap:
     """Return the map for the face of a rig; an empty one if it is not known."""
     return guess_control_map(rig.data.bones.keys())
 
 
 def retarget_face_bones(
-    captured: CapturedExpressions,
-    rig: bpy.types.Object,
-    expression_map: ExpressionMap,
-    name: str = "Face",
-) -> bpy.types.Action:
+    captured: CapturedExpressions, rig: Object, expression_map: ExpressionMap, name: str = "Face"
+) -> Action:
     """Key the face of a rig so that it shows the captured expressions; its other keys stay as they
     are.
 
@@ -256,7 +251,7 @@ def retarget_face_bones(
 
 
 def face_keys(
-    captured: CapturedExpressions, rig: bpy.types.Object, expression_map: ExpressionMap
+    captured: CapturedExpressions, rig: Object, expression_map: ExpressionMap
 ) -> FaceKeys:
     """Return the keys of the rig's controls.
 
@@ -286,7 +281,7 @@ def face_keys(
     return FaceKeys(captured.frames, controls, captured.repeat)
 
 
-def key_face(rig: bpy.types.Object, keys: FaceKeys, source: str) -> bpy.types.Action:
+def key_face(rig: Object, keys: FaceKeys, source: str) -> Action:
     """Replace the keys of a face in the action of its rig; return the action.
 
     :param source: name of the captured armature.
@@ -305,14 +300,14 @@ def key_face(rig: bpy.types.Object, keys: FaceKeys, source: str) -> bpy.types.Ac
     return channels.action
 
 
-def rest_face(rig: bpy.types.Object, keys: FaceKeys) -> None:
+def rest_face(rig: Object, keys: FaceKeys) -> None:
     """Put those controls of a face to rest that got no keys. Cannot fail."""
     for bone, moved in keys.controls.items():
         if not moved:
             rig.pose.bones[bone].matrix_basis = Matrix()
 
 
-def _channels(rig: bpy.types.Object, motion: BoneMotion) -> dict[str, Float64Array]:
+def _channels(rig: Object, motion: BoneMotion) -> dict[str, Float64Array]:
     """Return the values (T, n) of a control's channels; (1, n) of those that do not move, and none
     of those at rest.
     """

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+from bpy.types import CameraBackgroundImage, Scene
 
 from ..errors import VideoError
 from ..footage import PICTURE_SUFFIXES, sequence_from
@@ -32,7 +33,7 @@ def pictures_of_frames(motion: Motion, start_frame: float, rate: float) -> tuple
 
 
 def add_footage_strips(
-    scene: bpy.types.Scene,
+    scene: Scene,
     footage: str | Path,
     start_frame: float,
     pictures: Sequence[int] = (),
@@ -98,7 +99,7 @@ def add_footage_strips(
     return added
 
 
-def turn_strip(strip: bpy.types.Strip, background: bpy.types.CameraBackgroundImage) -> None:
+def turn_strip(strip: bpy.types.Strip, background: CameraBackgroundImage) -> None:
     """Turn and mirror the picture as the camera's background shows it: where the footage was turned
     for the capture.
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from bpy.types import Object, Scene
 
 from ...solver.body import Body
 from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
@@ -34,7 +35,7 @@ class LiveBody:
     removes them.
     """
 
-    def __init__(self, scene: bpy.types.Scene, name: str, body: Body) -> None:
+    def __init__(self, scene: Scene, name: str, body: Body) -> None:
         self._scene_uid = scene.session_uid
         self._name = name
         self._body = body
@@ -44,7 +45,7 @@ class LiveBody:
         self._names = list[str]()
 
     @property
-    def armature(self) -> bpy.types.Object | None:
+    def armature(self) -> Object | None:
         """The armature; None if it does not exist, yet or any more."""
         return found("objects", *self._armature)
 
@@ -53,12 +54,7 @@ class LiveBody:
         """The shape (P,) that is shown."""
         return self._betas
 
-    def show(
-        self,
-        rotations: Float64Array,
-        pelvis: Float64Array,
-        betas: FloatArray,
-    ) -> bool:
+    def show(self, rotations: Float64Array, pelvis: Float64Array, betas: FloatArray) -> bool:
         """Pose the body; return whether it was created for this.
 
         :param rotations: (K+1, 4) w, x, y, z; the root relative to the world, the others to their
@@ -115,7 +111,7 @@ class LiveBody:
         self._blocks = set()
         armature.remove_unused_ring()
 
-    def _create(self, betas: Float64Array) -> tuple[bpy.types.Object, bpy.types.Object]:
+    def _create(self, betas: Float64Array) -> tuple[Object, Object]:
         """Create the objects, in place of what is left of former ones.
 
         :raises UsageError: the scene was removed.

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import time
 
-import bpy
 import numpy as np
+from bpy.types import Object
 from mathutils import Matrix
 
 from ...solver.body import Body
@@ -38,11 +38,7 @@ class LiveRig:
     """A rig that follows one live capture."""
 
     def __init__(
-        self,
-        rig: bpy.types.Object,
-        body: Body,
-        bone_map: BoneMap,
-        options: RetargetOptions | None = None,
+        self, rig: Object, body: Body, bone_map: BoneMap, options: RetargetOptions | None = None
     ) -> None:
         """Measure the rig at rest.
 
@@ -89,16 +85,11 @@ class LiveRig:
         self._due_s = 0.0
 
     @property
-    def rig(self) -> bpy.types.Object | None:
+    def rig(self) -> Object | None:
         """The rig; None if it was removed."""
         return found("objects", *self._rig)
 
-    def show(
-        self,
-        rotations: Float64Array,
-        pelvis: Float64Array,
-        betas: FloatArray,
-    ) -> None:
+    def show(self, rotations: Float64Array, pelvis: Float64Array, betas: FloatArray) -> None:
         """Pose the rig.
 
         :param rotations: (K+1, 4) w, x, y, z; the root relative to the world, the others to their
@@ -118,7 +109,7 @@ class LiveRig:
         turns = basis(self._skeleton, self._turn @ pose.rotations)[0]
         self._write(rig, turns, (heads[0] - self._rest) @ self._location)
 
-    def _write(self, rig: bpy.types.Object, turns: Float64Array, location: Float64Array) -> None:
+    def _write(self, rig: Object, turns: Float64Array, location: Float64Array) -> None:
         """Set the channels of the mapped bones that still exist, each in its own rotation mode;
         their scale is 1.
 

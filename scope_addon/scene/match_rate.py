@@ -15,6 +15,7 @@ import re
 from collections.abc import Iterable, Iterator
 
 import bpy
+from bpy.types import ID, Action, Object, Scene
 
 from ..motion import Motion
 from ..notices import Notice
@@ -45,15 +46,15 @@ from .timing import Retiming, action_strips, played_actions, retime_keys, retime
 _MARKER = re.compile(rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) (\S+)")
 
 # The actions whose keys were moved, each with the handle of the slot.
-_Done = set[tuple[bpy.types.Action, int]]
+_Done = set[tuple[Action, int]]
 _ALL_SLOTS = -1
 
 
 def change_rate(
-    scene: bpy.types.Scene,
+    scene: Scene,
     rate: float,
-    people: dict[bpy.types.Object, Motion | None],
-    rigs: Iterable[tuple[bpy.types.Object, bpy.types.Object]],
+    people: dict[Object, Motion | None],
+    rigs: Iterable[tuple[Object, Object]],
 ) -> list[Notice]:
     """Set the scene's frame rate, and move the captures in time so that they keep their speed.
 
@@ -111,7 +112,7 @@ def retimed(spans: Iterable[FrameSpan], retiming: Retiming) -> list[FrameSpan]:
     ]
 
 
-def _played(scene: bpy.types.Scene, people: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+def _played(scene: Scene, people: Iterable[Object]) -> list[Object]:
     """Return the people of the capture whose keys the scene's frame range spans; none if it is
     another range.
     """
@@ -129,7 +130,7 @@ def _played(scene: bpy.types.Scene, people: Iterable[bpy.types.Object]) -> list[
     return []
 
 
-def _datablocks(person: bpy.types.Object) -> list[bpy.types.ID]:
+def _datablocks(person: Object) -> list[ID]:
     """Return what a capture animates of a person: armature, root motion, and shape keys."""
     shapes = [
         keys
@@ -139,7 +140,7 @@ def _datablocks(person: bpy.types.Object) -> list[bpy.types.ID]:
     return [person, *filter(None, [root_object(person)]), *shapes]
 
 
-def _retime(datablock: bpy.types.ID, retiming: Retiming, done: _Done) -> None:
+def _retime(datablock: ID, retiming: Retiming, done: _Done) -> None:
     animation = datablock.animation_data
     if animation is None:
         return
@@ -161,11 +162,7 @@ def _retime(datablock: bpy.types.ID, retiming: Retiming, done: _Done) -> None:
             retime_keys(fcurves_in_slot(user.action, slot), retiming)
 
 
-def _retime_faces(
-    scene: bpy.types.Scene,
-    people: Iterable[bpy.types.Object],
-    sources: dict[str, Retiming],
-) -> None:
+def _retime_faces(scene: Scene, people: Iterable[Object], sources: dict[str, Retiming]) -> None:
     """Move the strips by which shape keys of the user's meshes play what retargeting has written;
     the actions are not moved.
 
@@ -197,12 +194,7 @@ def _retime_written_actions(sources: dict[str, Retiming], done: _Done) -> None:
             retime_written_keys(action, sources[source_of(action)])
 
 
-def _retime_rig(
-    rig: bpy.types.Object,
-    retiming: Retiming,
-    sources: dict[str, Retiming],
-    done: _Done,
-) -> None:
+def _retime_rig(rig: Object, retiming: Retiming, sources: dict[str, Retiming], done: _Done) -> None:
     """Move the keys that retargeting has written, also of captures other than the one that the rig
     has now, and the strips that play them; the rig's other actions stay, and those of a library,
     whose keys Blender does not change.
@@ -225,15 +217,13 @@ def _retime_rig(
         _retime(root, retiming, done)
 
 
-def _is_written_here(action: bpy.types.Action) -> bool:
+def _is_written_here(action: Action) -> bool:
     """Return whether retargeting has written an action that this file stores."""
     return action.library is None and is_retargeted(action)
 
 
 def _retime_markers(
-    scene: bpy.types.Scene,
-    ranges: dict[bpy.types.Object, tuple[float, float] | None],
-    moves: dict[bpy.types.Object, Retiming],
+    scene: Scene, ranges: dict[Object, tuple[float, float] | None], moves: dict[Object, Retiming]
 ) -> None:
     """Move the markers of review spans, which are named after them, with the capture in whose keys
     they lie.
@@ -253,9 +243,7 @@ def _retime_markers(
         _rename_marker(scene, inside[-1], former, marker.name)
 
 
-def _rename_marker(
-    scene: bpy.types.Scene, person: bpy.types.Object, former: str, name: str
-) -> None:
+def _rename_marker(scene: Scene, person: Object, former: str, name: str) -> None:
     """Let the capture of a person know a marker by its new name, to remove it with the capture."""
     for collection in captures_of(scene):
         names = stored_text(collection, MARKERS).split("\n")
@@ -264,9 +252,7 @@ def _rename_marker(
             collection[MARKERS] = "\n".join(names)
 
 
-def _show_footage(
-    scene: bpy.types.Scene, people: dict[bpy.types.Object, Motion | None], rate: float
-) -> list[Notice]:
+def _show_footage(scene: Scene, people: dict[Object, Motion | None], rate: float) -> list[Notice]:
     """Show the footage of every capture's cameras in step with the moved keys."""
     warnings: list[Notice] = []
     for collection in captures_of(scene):
@@ -291,15 +277,13 @@ def _show_footage(
     return warnings
 
 
-def is_animated(scene: bpy.types.Scene) -> bool:
+def is_animated(scene: Scene) -> bool:
     """Return whether anything in a scene is animated, captures included."""
     return _is_itself_animated(scene) or any(map(_has_keys, _blocks_of(scene.objects)))
 
 
 def other_animation(
-    scene: bpy.types.Scene,
-    people: Iterable[bpy.types.Object],
-    rigs: Iterable[tuple[bpy.types.Object, object]],
+    scene: Scene, people: Iterable[Object], rigs: Iterable[tuple[Object, object]]
 ) -> bool:
     """Return whether anything else in the scene is animated, which keeps its frames at another
     rate.
@@ -314,7 +298,7 @@ def other_animation(
     return _is_itself_animated(scene) or any(_has_keys(block, retargeted=False) for block in others)
 
 
-def _is_itself_animated(scene: bpy.types.Scene) -> bool:
+def _is_itself_animated(scene: Scene) -> bool:
     """Return whether a scene has strips in its sequencer, or its settings, compositing or world are
     animated. Footage that was added to the sequencer for a capture does not count.
     """
@@ -324,9 +308,9 @@ def _is_itself_animated(scene: bpy.types.Scene) -> bool:
     return any(map(_has_keys, _with_trees([scene, scene.world])))
 
 
-def _blocks_of(objects: Iterable[bpy.types.Object]) -> set[bpy.types.ID]:
+def _blocks_of(objects: Iterable[Object]) -> set[ID]:
     """Return objects with what they are made of: data, shape keys, materials, nodes."""
-    found: list[bpy.types.ID | None] = []
+    found: list[ID | None] = []
     for obj in objects:
         found += with_data(obj)
         found += [slot.material for slot in obj.material_slots]
@@ -335,10 +319,10 @@ def _blocks_of(objects: Iterable[bpy.types.Object]) -> set[bpy.types.ID]:
     return set(_with_trees(dict.fromkeys(found)))
 
 
-def _with_trees(blocks: Iterable[bpy.types.ID | None]) -> Iterator[bpy.types.ID]:
+def _with_trees(blocks: Iterable[ID | None]) -> Iterator[ID]:
     """Yield datablocks, their node trees, and the groups within these."""
     waiting = [block for block in blocks if block is not None]
-    seen: set[bpy.types.ID] = set()
+    seen: set[ID] = set()
     while waiting:
         block = waiting.pop()
         if block in seen:
@@ -351,7 +335,7 @@ def _with_trees(blocks: Iterable[bpy.types.ID | None]) -> Iterator[bpy.types.ID]
         waiting += [tree for tree in trees if tree is not None]
 
 
-def _has_keys(block: bpy.types.ID, *, retargeted: bool = True) -> bool:
+def _has_keys(block: ID, *, retargeted: bool = True) -> bool:
     """Return whether an action or a strip animates a datablock.
 
     :param retargeted: count actions that retargeting has written.

@@ -14,6 +14,7 @@ import os
 from dataclasses import replace
 
 import bpy
+from bpy.types import Object, Text
 
 from ...solver.errors import ScopeError
 from ..edit.clip import Clip
@@ -34,7 +35,7 @@ Smoothing and the export of motion files start from it. It is deleted with the a
 """
 
 
-def pack_motion(armature: bpy.types.Object, content: bytes, keys: bytes = b"") -> None:
+def pack_motion(armature: Object, content: bytes, keys: bytes = b"") -> None:
     """Store a motion file's bytes with the armature. Duplicates of the armature keep the motion
     that they have.
 
@@ -53,7 +54,7 @@ def pack_motion(armature: bpy.types.Object, content: bytes, keys: bytes = b"") -
     text.use_fake_user = False
 
 
-def stored_motion(armature: bpy.types.Object) -> Motion:
+def stored_motion(armature: Object) -> Motion:
     """Return the motion that is stored with the armature. A .blend file may be hostile: nothing is
     unpickled.
 
@@ -61,7 +62,7 @@ def stored_motion(armature: bpy.types.Object) -> Motion:
     :raises MotionFileError: what it stores is damaged or not a motion.
     """
     stored = armature.get(MOTION)
-    if isinstance(stored, bpy.types.Text):
+    if isinstance(stored, Text):
         content = stored.get(_CONTENT)
         name = f"the motion in the text '{stored.name}'"
         if not isinstance(content, bytes):
@@ -83,7 +84,7 @@ def stored_motion(armature: bpy.types.Object) -> Motion:
     )
 
 
-def apart_at_cuts(armature: bpy.types.Object, clip: Clip, rate: float) -> Clip:
+def apart_at_cuts(armature: Object, clip: Clip, rate: float) -> Clip:
     """Return the keys of an armature with gaps in their times at the cuts of the footage, so that
     they can be filtered; as they are where the motion is lost.
 
@@ -96,15 +97,15 @@ def apart_at_cuts(armature: bpy.types.Object, clip: Clip, rate: float) -> Clip:
     return replace(clip, times=with_scene_gaps(clip.times, cuts_s + start_frame(armature) / rate))
 
 
-def stored_keys(armature: bpy.types.Object) -> object:
+def stored_keys(armature: Object) -> object:
     """Return the bytes of the armature's ``UncorrectedKeys`` as they are stored; None if there are
     none.
     """
     stored = armature.get(MOTION)
-    return stored.get(_KEYS) if isinstance(stored, bpy.types.Text) else None
+    return stored.get(_KEYS) if isinstance(stored, Text) else None
 
 
-def motion_texts(armatures: list[bpy.types.Object]) -> list[bpy.types.Text]:
+def motion_texts(armatures: list[Object]) -> list[Text]:
     """Return the texts that hold the armatures' motions."""
     found = [armature.get(MOTION) for armature in armatures]
-    return list(dict.fromkeys(text for text in found if isinstance(text, bpy.types.Text)))
+    return list(dict.fromkeys(text for text in found if isinstance(text, Text)))

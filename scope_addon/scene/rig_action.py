@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 import bpy
 import numpy as np
+from bpy.types import ID, Action, AnimData, Object
 from mathutils import Matrix
 
 from ..arrays import Float64Array
@@ -24,11 +25,7 @@ _OFFSETS = {"location": 0.0, "scale": 1.0}
 
 
 def root_locations(
-    rig: bpy.types.Object,
-    place: Float64Array,
-    skeleton: Skeleton,
-    root: int,
-    heads: Float64Array,
+    rig: Object, place: Float64Array, skeleton: Skeleton, root: int, heads: Float64Array
 ) -> Float64Array:
     """Return the location channel (T, 3) of the root bone.
 
@@ -50,9 +47,7 @@ def location_axes(bone: bpy.types.Bone) -> Float64Array:
     return np.array(owner.matrix_local.to_3x3(), float) if owner is not None else np.eye(3)
 
 
-def write_action(
-    rig: bpy.types.Object, keys: list[BoneMotion], frames: Float64Array, source: str
-) -> bpy.types.Action:
+def write_action(rig: Object, keys: list[BoneMotion], frames: Float64Array, source: str) -> Action:
     """Create a new action with the keys, in the rotation mode of each bone.
 
     Where the NLA moves or scales one of the bones, a key keeps it in place and in size.
@@ -84,7 +79,7 @@ def write_action(
     return action
 
 
-def mark_written(action: bpy.types.Action, source: str = "") -> None:
+def mark_written(action: Action, source: str = "") -> None:
     """Remember the keys that retargeting has written, to tell later whether they were edited.
 
     :param source: name of the captured armature whose motion they are; empty: as before.
@@ -103,7 +98,7 @@ def follow_renaming(names: dict[str, str]) -> None:
             action[KEYS_OF] = name
 
 
-def clear_offsets(rig: bpy.types.Object, bones: Iterable[str]) -> None:
+def clear_offsets(rig: Object, bones: Iterable[str]) -> None:
     """Undo what the pose moves and scales bones by; retargeting only turns them, and measured them
     without it.
 
@@ -114,13 +109,13 @@ def clear_offsets(rig: bpy.types.Object, bones: Iterable[str]) -> None:
             setattr(rig.pose.bones[name], channel, (value,) * 3)
 
 
-def leave_tweak_mode(animated: bpy.types.ID) -> None:
+def leave_tweak_mode(animated: ID) -> None:
     """Leave the NLA's Tweak Mode, in which no action can be assigned."""
     if animated.animation_data and animated.animation_data.use_tweak_mode:
         animated.animation_data.use_tweak_mode = False
 
 
-def override_nla(animation: bpy.types.AnimData) -> None:
+def override_nla(animation: AnimData) -> None:
     """Make the active action replace the NLA tracks below it for its bones, whatever the former
     action's blending.
     """
@@ -130,7 +125,7 @@ def override_nla(animation: bpy.types.AnimData) -> None:
         track.is_solo = False  # a solo track would silence the action
 
 
-def retire(former: bpy.types.Action | None, source: str) -> None:
+def retire(former: Action | None, source: str) -> None:
     """Keep the rig's former action in the file, unless it is an earlier retargeting that was not
     edited.
 
@@ -146,7 +141,7 @@ def retire(former: bpy.types.Action | None, source: str) -> None:
         former.use_fake_user = True
 
 
-def replace_action(rig: bpy.types.Object, former: bpy.types.Action | None, source: str) -> None:
+def replace_action(rig: Object, former: Action | None, source: str) -> None:
     """Let a rig show its new action in place of the former one; name it after rig and capture.
 
     :param source: name of the captured armature.
@@ -157,7 +152,7 @@ def replace_action(rig: bpy.types.Object, former: bpy.types.Action | None, sourc
     rig.animation_data.action.name = f"{rig.name}_{source}"
 
 
-def retime_written_keys(action: bpy.types.Action, retiming: Retiming) -> None:
+def retime_written_keys(action: Action, retiming: Retiming) -> None:
     """Move the keys of a retargeted action; it counts as edited only if it was."""
     unedited = action.get(_CHECKSUM) == _checksum(action)
     retime_keys(fcurves_of(action), retiming)
@@ -165,12 +160,12 @@ def retime_written_keys(action: bpy.types.Action, retiming: Retiming) -> None:
         mark_written(action)
 
 
-def is_retargeted(action: bpy.types.Action) -> bool:
+def is_retargeted(action: Action) -> bool:
     """Return whether retargeting has written the action."""
     return _CHECKSUM in action
 
 
-def _checksum(action: bpy.types.Action) -> str:
+def _checksum(action: Action) -> str:
     """Return a checksum of the keys, to detect edits."""
     found = hashlib.sha256()
     for curve in fcurves_of(action):

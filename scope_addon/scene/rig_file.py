@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import bpy
+from bpy.types import Collection, Key, Object
 from mathutils import Matrix
 
 from ...solver.body import Body
@@ -42,7 +43,7 @@ from .rig_retarget import RetargetOptions, common_travel, retarget, usable_guess
 from .timing import played_actions
 
 
-def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.Object:
+def load_rig(source: RigSource, collection: Collection) -> Object:
     """Load the rig into ``collection`` of the active scene, without animation; return its armature.
 
     :raises InputError: when the file cannot be read, has no armature, or one of too many bones.
@@ -72,7 +73,7 @@ def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.O
     return rig
 
 
-def _check_finite(path: Path, rig: bpy.types.Object) -> None:
+def _check_finite(path: Path, rig: Object) -> None:
     matrices = [rig.matrix_world, *(bone.matrix_local for bone in rig.data.bones)]
     if not all(math.isfinite(value) for matrix in matrices for row in matrix for value in row):
         raise InputError(
@@ -81,9 +82,7 @@ def _check_finite(path: Path, rig: bpy.types.Object) -> None:
         )
 
 
-def with_meshes(
-    rig: bpy.types.Object, objects: Iterable[bpy.types.Object]
-) -> list[bpy.types.Object]:
+def with_meshes(rig: Object, objects: Iterable[Object]) -> list[Object]:
     """Return the rig, those of the objects that are meshes deformed by it, and the parents of
     these.
     """
@@ -135,7 +134,7 @@ def _files_referred_to(rig: Path) -> list[Path]:
     return files
 
 
-def rig_bone_map(source: RigSource, rig: bpy.types.Object) -> BoneMap:
+def rig_bone_map(source: RigSource, rig: Object) -> BoneMap:
     """Return the given bone map, or else guess one.
 
     :raises InputError: when it does not match the rig, or a required part could not be guessed.
@@ -158,7 +157,7 @@ def rig_bone_map(source: RigSource, rig: bpy.types.Object) -> BoneMap:
     return found
 
 
-def _append(path: Path) -> tuple[list[bpy.types.Object], float]:
+def _append(path: Path) -> tuple[list[Object], float]:
     """Return the objects of a .blend file, and the metres that a length of 1 stands for in it.
 
     :raises InputError: when Blender cannot read the file.
@@ -180,7 +179,7 @@ def _append(path: Path) -> tuple[list[bpy.types.Object], float]:
     return [obj for obj in here.objects if obj is not None], unit
 
 
-def _import(path: Path) -> list[bpy.types.Object]:
+def _import(path: Path) -> list[Object]:
     before = {obj.session_uid for obj in bpy.data.objects}
     try:
         with formats.quiet():
@@ -204,7 +203,7 @@ def _import(path: Path) -> list[bpy.types.Object]:
     return [obj for obj in bpy.data.objects if obj.session_uid not in before]
 
 
-def _choose(path: Path, rigs: list[bpy.types.Object], name: str) -> bpy.types.Object:
+def _choose(path: Path, rigs: list[Object], name: str) -> Object:
     """Choose the armature of a file.
 
     :param name: may be empty if there is only one.
@@ -231,7 +230,7 @@ def _choose(path: Path, rigs: list[bpy.types.Object], name: str) -> bpy.types.Ob
     return rigs[0]
 
 
-def _moved_by(obj: bpy.types.Object, rig: bpy.types.Object) -> bool:
+def _moved_by(obj: Object, rig: Object) -> bool:
     if is_deformed_by(obj, rig):
         return True
     while obj is not None and obj != rig:
@@ -239,7 +238,7 @@ def _moved_by(obj: bpy.types.Object, rig: bpy.types.Object) -> bool:
     return obj is not None
 
 
-def _remove_animation(obj: bpy.types.Object) -> None:
+def _remove_animation(obj: Object) -> None:
     """Remove the actions and NLA of an object, its data and its shape keys, of which those that
     moved go back to 0; drivers are kept.
     """
@@ -251,7 +250,7 @@ def _remove_animation(obj: bpy.types.Object) -> None:
         animation.action = None
         for track in list(animation.nla_tracks):
             animation.nla_tracks.remove(track)
-        if isinstance(datablock, bpy.types.Key):
+        if isinstance(datablock, Key):
             moved = {curve.data_path for action in played for curve in fcurves_of(action)}
             for block in datablock.key_blocks:
                 if shape_key_path(block.name) in moved:
@@ -316,9 +315,7 @@ def export_on_rig(
     return written, warnings
 
 
-def _face_of_bones(
-    rig: bpy.types.Object, faces: Sequence[bpy.types.Object], source: RigSource
-) -> ExpressionMap | None:
+def _face_of_bones(rig: Object, faces: Sequence[Object], source: RigSource) -> ExpressionMap | None:
     """Return the expression map if bones move the rig's face; a guess is made only where no shape
     keys do.
     """
@@ -328,11 +325,7 @@ def _face_of_bones(
 
 
 def _retarget_face(
-    armature: bpy.types.Object,
-    faces: Sequence[bpy.types.Object],
-    source: RigSource,
-    *,
-    bones_move_it: bool,
+    armature: Object, faces: Sequence[Object], source: RigSource, *, bones_move_it: bool
 ) -> list[Notice]:
     """Retarget the captured expressions, if there are any, to the rig's meshes; return warnings.
 
@@ -352,7 +345,7 @@ def _retarget_face(
     return driven_keys(faces, given)
 
 
-def export_rig(path: Path, rig: bpy.types.Object, options: ExportOptions) -> list[Path]:
+def export_rig(path: Path, rig: Object, options: ExportOptions) -> list[Path]:
     """Write an animated rig of the scene with the meshes that it deforms; return the files written.
 
     Its size is the one that it has in the unit of the scene.

@@ -15,6 +15,7 @@ from contextlib import AbstractContextManager, contextmanager
 
 import bpy
 import numpy as np
+from bpy.types import FCurve, Object
 from mathutils import Matrix, Quaternion
 
 from ...solver.errors import InputError
@@ -55,7 +56,7 @@ _CARRIED_BY = {"knee": "hip", "ankle": "knee", "elbow": "shoulder", "wrist": "el
 _MAX_LIFT = 0.17
 
 
-def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
+def probe(rig: Object, parts: dict[str, str]) -> Skeleton:
     """Measure the mapped bones at rest and their dependencies; the rig must be ``at_rest``.
 
     :param parts: bone name -> body part.
@@ -96,7 +97,7 @@ def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
 
 
 def _check_carried(
-    rig: bpy.types.Object, names: list[str], carriers: IndexArray, parts: dict[str, str]
+    rig: Object, names: list[str], carriers: IndexArray, parts: dict[str, str]
 ) -> None:
     """Check that every limb moves as one piece with the pelvis; goals of IK, for example, do not.
 
@@ -121,7 +122,7 @@ def _check_carried(
 
 
 def _dependencies(
-    rig: bpy.types.Object, parts: dict[str, str], rest: Float64Array
+    rig: Object, parts: dict[str, str], rest: Float64Array
 ) -> tuple[BoolArray, BoolArray]:
     """Rotate each bone and observe the others, in the armature's space: the object may shear them.
 
@@ -179,7 +180,7 @@ def _nearest(above: BoolArray) -> IndexArray:
     return np.array([max(np.flatnonzero(row[:b]), default=-1) for b, row in enumerate(above)], int)
 
 
-def _floor(rig: bpy.types.Object, rest: RestPose, parts: dict[str, str]) -> float:
+def _floor(rig: Object, rest: RestPose, parts: dict[str, str]) -> float:
     """Return the height of the floor: below the soles of the feet; without skin, the rig's origin
     if the rig rests near it, otherwise the lowest point where one of its bones begins or ends.
     """
@@ -196,7 +197,7 @@ def _floor(rig: bpy.types.Object, rest: RestPose, parts: dict[str, str]) -> floa
     return float(origin if abs(lowest - origin) < _MAX_LIFT * rest.size else lowest)
 
 
-def _check_rotated(rig: bpy.types.Object, names: list[str], turned: Float64Array) -> None:
+def _check_rotated(rig: Object, names: list[str], turned: Float64Array) -> None:
     """Check that the probe rotated these bones; other bones at rest would seem to follow one that
     did not.
 
@@ -216,7 +217,7 @@ def _check_rotated(rig: bpy.types.Object, names: list[str], turned: Float64Array
         )
 
 
-def _check_root_moves(rig: bpy.types.Object, name: str) -> None:
+def _check_root_moves(rig: Object, name: str) -> None:
     """Check that the pelvis, whose location is the root motion, can be moved. Leaves it at rest.
 
     :raises InputError: when it cannot.
@@ -244,10 +245,7 @@ def _check_root_moves(rig: bpy.types.Object, name: str) -> None:
 
 
 def blocked_bones(
-    rig: bpy.types.Object,
-    keys: Sequence[BoneMotion],
-    wanted: Float64Array,
-    heads: Float64Array,
+    rig: Object, keys: Sequence[BoneMotion], wanted: Float64Array, heads: Float64Array
 ) -> list[Notice]:
     """Return warnings about bones that deviate from the motion although they can be moved, such as
     a leg with IK.
@@ -275,7 +273,7 @@ def blocked_bones(
     return [notice("blocked_bones", bones=blocked, rig=rig.name)] if blocked else []
 
 
-def _is_driven(rig: bpy.types.Object, key: BoneMotion) -> bool:
+def _is_driven(rig: Object, key: BoneMotion) -> bool:
     """Return whether drivers replace keys of a bone, whatever they make of them at this frame."""
     drivers = rig.animation_data.drivers if rig.animation_data else ()
     mode = rig.pose.bones[key.bone].rotation_mode
@@ -285,7 +283,7 @@ def _is_driven(rig: bpy.types.Object, key: BoneMotion) -> bool:
     return any(driver.data_path in paths and not driver.mute for driver in drivers)
 
 
-def posed_bones(rig: bpy.types.Object, names: Sequence[str]) -> list[Notice]:
+def posed_bones(rig: Object, names: Sequence[str]) -> list[Notice]:
     """Return a warning about bones above mapped ones that are posed, or that the NLA poses: they
     move the motion, which was measured with them at rest.
 
@@ -320,7 +318,7 @@ def _is_posed(bone: bpy.types.PoseBone) -> bool:
     return bool(np.abs(offset).max() > _VISIBLE)
 
 
-def _leaves_rest(curve: bpy.types.FCurve) -> bool:
+def _leaves_rest(curve: FCurve) -> bool:
     """Return whether a curve of a bone's location, rotation or scale has other values than at rest,
     as far as its keys tell; all that is keyed together with a posed bone has keys at rest.
     """
@@ -363,7 +361,7 @@ def basis_of(key: BoneMotion, t: int) -> Matrix:
     return matrix
 
 
-def _matrices(rig: bpy.types.Object, names: list[str]) -> Float64Array:
+def _matrices(rig: Object, names: list[str]) -> Float64Array:
     """Return the evaluated bones to world (B, 4, 4)."""
     bpy.context.view_layer.update()
     posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -371,7 +369,7 @@ def _matrices(rig: bpy.types.Object, names: list[str]) -> Float64Array:
 
 
 @contextmanager
-def at_rest(rig: bpy.types.Object) -> Iterator[None]:
+def at_rest(rig: Object) -> Iterator[None]:
     """Evaluate the rig without animation, pose and root object, with limbs switched to FK, inside
     the block.
 
@@ -411,14 +409,14 @@ def at_rest(rig: bpy.types.Object) -> Iterator[None]:
                 assign_action(animation, action, slot)
 
 
-def skin_unmodified(rig: bpy.types.Object) -> AbstractContextManager[None]:
+def skin_unmodified(rig: Object) -> AbstractContextManager[None]:
     """Leave out the modifiers of the meshes that a rig deforms inside the block: only bones are
     measured.
     """
     return modifiers_off(obj for obj in bpy.context.scene.objects if is_deformed_by(obj, rig))
 
 
-def rest_pose(rig: bpy.types.Object, *, with_skin: bool = False) -> RestPose:
+def rest_pose(rig: Object, *, with_skin: bool = False) -> RestPose:
     """Return all bones of a rig at rest, in the world.
 
     :param with_skin: read the meshes that the rig deforms, too; the rig must be ``at_rest``.
@@ -450,9 +448,7 @@ def rest_pose(rig: bpy.types.Object, *, with_skin: bool = False) -> RestPose:
     return RestPose(names, parents, heads, tails, np.concatenate(points), np.concatenate(owners))
 
 
-def _owners(
-    mesh: bpy.types.Object, rig: bpy.types.Object, row: dict[str, int]
-) -> IndexArray | None:
+def _owners(mesh: Object, rig: Object, row: dict[str, int]) -> IndexArray | None:
     """Return the bone that moves each vertex most (V,), -1 for none; None if the rig does not move
     the mesh.
     """

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
+from bpy.types import Action, Object
 from mathutils import Matrix
 
 from ...solver.body import Body
@@ -95,7 +96,7 @@ class RetargetResult:
     positions.
     """
 
-    action: bpy.types.Action
+    action: Action
     warnings: list[Notice]
     travel: float
 
@@ -110,7 +111,7 @@ class _PlacedMotion:
     trajectory: tuple[Float64Array, Float64Array] | None = None
 
 
-def guess_bone_map(rig: bpy.types.Object) -> BoneMap:
+def guess_bone_map(rig: Object) -> BoneMap:
     """Guess the bone map from the rig's names and rest pose.
 
     :raises InputError: when the rig has no bones.
@@ -118,7 +119,7 @@ def guess_bone_map(rig: bpy.types.Object) -> BoneMap:
     return guess(rest_pose(rig), is_mirrored=rig.matrix_world.determinant() < 0.0)
 
 
-def usable_guess(rig: bpy.types.Object) -> BoneMap:
+def usable_guess(rig: Object) -> BoneMap:
     """Guess the bone map, to be used without anybody looking at it.
 
     :raises InputError: when the rig has no bones, or its rest pose contradicts the guess.
@@ -133,7 +134,7 @@ def usable_guess(rig: bpy.types.Object) -> BoneMap:
     return found
 
 
-def map_notices(rig: bpy.types.Object, bone_map: BoneMap) -> list[Notice]:
+def map_notices(rig: Object, bone_map: BoneMap) -> list[Notice]:
     """Return what a user should know about a bone map: guesses, parts without bones, and bones that
     do not look like their parts.
     """
@@ -155,7 +156,7 @@ def map_notices(rig: bpy.types.Object, bone_map: BoneMap) -> list[Notice]:
     return notices
 
 
-def _heads_at_rest(rig: bpy.types.Object, bone_map: BoneMap) -> dict[str, Float64Array]:
+def _heads_at_rest(rig: Object, bone_map: BoneMap) -> dict[str, Float64Array]:
     """Return the head (3,) of the first bone of each part at rest, in the world, metres."""
     heads: dict[str, Float64Array] = {}
     for bone, part in bone_map.parts.items():
@@ -165,10 +166,10 @@ def _heads_at_rest(rig: bpy.types.Object, bone_map: BoneMap) -> dict[str, Float6
 
 
 def retarget(
-    source: bpy.types.Object,
+    source: Object,
     body: Body,
     betas: FloatArray,
-    rig: bpy.types.Object,
+    rig: Object,
     bone_map: BoneMap,
     rate: float,
     options: RetargetOptions | None = None,
@@ -253,10 +254,7 @@ def retarget(
 
 
 def common_travel(
-    body: Body,
-    people_betas: Sequence[FloatArray],
-    rig: bpy.types.Object,
-    bone_map: BoneMap,
+    body: Body, people_betas: Sequence[FloatArray], rig: Object, bone_map: BoneMap
 ) -> float:
     """Return the scale of positions for several people on copies of one rig: by their mean leg
     length.
@@ -275,9 +273,7 @@ def common_travel(
     return len(ratios) / sum(1.0 / ratio for ratio in ratios)
 
 
-def usable_map(
-    source: bpy.types.Object | None, body: Body, rig: bpy.types.Object, bone_map: BoneMap
-) -> BoneMap:
+def usable_map(source: Object | None, body: Body, rig: Object, bone_map: BoneMap) -> BoneMap:
     """Return the bone map without the parts that the body lacks.
 
     :param source: the captured armature, if there is one.
@@ -367,7 +363,7 @@ def _with_source_transform(
     return R[:, None] @ rotations, rotated(R, heads) + position, angles
 
 
-def _back_above_root_object(rig: bpy.types.Object, frames: Float64Array) -> Float64Array:
+def _back_above_root_object(rig: Object, frames: Float64Array) -> Float64Array:
     """Return `_back` of the parents above the rig's root object, from which ``at_rest`` detaches
     it.
     """
@@ -418,7 +414,7 @@ def _moved_back(motion: _PlacedMotion, back: Float64Array) -> _PlacedMotion:
     return replace(motion, rotations=R[:, None] @ motion.rotations, heads=heads)
 
 
-def _places(source: bpy.types.Object, frames: Float64Array) -> Float64Array:
+def _places(source: Object, frames: Float64Array) -> Float64Array:
     """Return the transform of the captured armature, or of a rig ``at_rest``, to the world at scene
     frames (T,), (T, 4, 4); (1, 4, 4) if it does not move.
 
@@ -455,7 +451,7 @@ def _most_upright(places: Float64Array, place: Float64Array) -> int:
     return int(np.where(apart < _SAME_SIZE, np.abs(R[:, 2]).max(axis=1), -apart).argmax())
 
 
-def _is_carried(source: bpy.types.Object) -> bool:
+def _is_carried(source: Object) -> bool:
     """Return whether the captured armature, or what it is parented to above its root object, may
     move.
     """
@@ -470,14 +466,14 @@ def _is_carried(source: bpy.types.Object) -> bool:
     return False
 
 
-def _is_animated(obj: bpy.types.Object) -> bool:
+def _is_animated(obj: Object) -> bool:
     """Return whether keys, drivers or strips animate anything of an object, such as its bones."""
     animation = obj.animation_data
     drivers = animation.drivers if animation is not None else ()
     return bool(fcurves(obj) or len(drivers) or nla_strips(obj))
 
 
-def _repeat(rig: bpy.types.Object, action: bpy.types.Action, keys: Sequence[BoneMotion]) -> None:
+def _repeat(rig: Object, action: Action, keys: Sequence[BoneMotion]) -> None:
     """Repeat the keys as the captured person's loop does: each cycle goes on where the one before
     it ended.
     """
@@ -493,7 +489,7 @@ def _repeat(rig: bpy.types.Object, action: bpy.types.Action, keys: Sequence[Bone
         repeat_root_object(empty)
 
 
-def _set_parent(rig: bpy.types.Object, frames: Float64Array, motion: _PlacedMotion) -> None:
+def _set_parent(rig: Object, frames: Float64Array, motion: _PlacedMotion) -> None:
     """Parent the rig to a root object that follows the trajectory, or remove a former root
     object.
     """

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.types import Object
 from mathutils import Matrix
 
 from ..retarget.rest_pose import BoneMotion
@@ -39,7 +40,7 @@ class _Limb:
     at_rest: tuple[str, ...]  # further controls below the end's, which stay at rest
 
 
-def ik_keys(rig: bpy.types.Object, keys: list[BoneMotion]) -> list[BoneMotion]:
+def ik_keys(rig: Object, keys: list[BoneMotion]) -> list[BoneMotion]:
     """Return the keys of the IK controls; none for other rigs, and for limbs of which an FK control
     has no keys.
 
@@ -86,7 +87,7 @@ def _shown_at_the_mouse(count: int) -> Iterator[int]:
         manager.progress_end()
 
 
-def _limbs(rig: bpy.types.Object) -> list[_Limb]:
+def _limbs(rig: Object) -> list[_Limb]:
     """Return the limbs of a generated rig that switch between FK and IK."""
     bones = rig.pose.bones
     found = []
@@ -113,7 +114,7 @@ def _limbs(rig: bpy.types.Object) -> list[_Limb]:
     return found
 
 
-def _moved(rig: bpy.types.Object, control: str, fk: str) -> Matrix:
+def _moved(rig: Object, control: str, fk: str) -> Matrix:
     """Return the pose of a bone that has moved as its FK counterpart has; both may rest in
     different orientations.
     """
@@ -123,12 +124,12 @@ def _moved(rig: bpy.types.Object, control: str, fk: str) -> Matrix:
     )
 
 
-def _match(rig: bpy.types.Object, control: str, fk: str, bases: dict[str, list[Matrix]]) -> None:
+def _match(rig: Object, control: str, fk: str, bases: dict[str, list[Matrix]]) -> None:
     """Move a control as its FK counterpart has moved."""
     _set(rig, control, _moved(rig, control, fk), bases)
 
 
-def _hinge(rig: bpy.types.Object, limb: _Limb, bases: dict[str, list[Matrix]]) -> None:
+def _hinge(rig: Object, limb: _Limb, bases: dict[str, list[Matrix]]) -> None:
     """Pose the base and the middle bone so that both point as their FK counterparts do, and place
     the pole target.
 
@@ -165,9 +166,7 @@ def _hinge(rig: bpy.types.Object, limb: _Limb, bases: dict[str, list[Matrix]]) -
     _place_pole(rig, limb, base, bases)
 
 
-def _place_pole(
-    rig: bpy.types.Object, limb: _Limb, base: Matrix, bases: dict[str, list[Matrix]]
-) -> None:
+def _place_pole(rig: Object, limb: _Limb, base: Matrix, bases: dict[str, list[Matrix]]) -> None:
     """Place the pole target before the middle joint, where the base's axis points that the solver
     turns towards it.
     """
@@ -190,7 +189,7 @@ def _place_pole(
     _set(rig, limb.pole, Matrix.LocRotScale(place.tolist(), rest.to_quaternion(), None), bases)
 
 
-def _set(rig: bpy.types.Object, name: str, matrix: Matrix, bases: dict[str, list[Matrix]]) -> None:
+def _set(rig: Object, name: str, matrix: Matrix, bases: dict[str, list[Matrix]]) -> None:
     """Pose a control at a matrix in the armature's space, and append its channels to ``bases``."""
     bone = rig.pose.bones[name]
     above = rig.pose.bones[name].parent

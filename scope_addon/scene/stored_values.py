@@ -11,7 +11,7 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-import bpy
+from bpy.types import ID, Action, Object
 
 if TYPE_CHECKING:
     from ..arrays import Float64Array
@@ -28,9 +28,7 @@ _LARGEST = 1e9  # of numbers in a list
 _SPAN = re.compile(r"(-?\d{1,7})(?:-(-?\d{1,7}))?", re.ASCII)
 
 
-def stored_number(
-    block: bpy.types.ID, name: str, default: float, lowest: float, highest: float
-) -> float:
+def stored_number(block: ID, name: str, default: float, lowest: float, highest: float) -> float:
     """Return a number between two others; the default if the property is missing or something
     else.
     """
@@ -40,7 +38,7 @@ def stored_number(
     )
 
 
-def stored_numbers(block: bpy.types.ID, name: str) -> list[float]:
+def stored_numbers(block: ID, name: str) -> list[float]:
     """Return a list of finite numbers; empty if the property is missing or something else."""
     value = block.get(name)
     # Blender's own type for lists of numbers
@@ -52,32 +50,32 @@ def stored_numbers(block: bpy.types.ID, name: str) -> list[float]:
     return [float(x) for x in values]
 
 
-def stored_text(block: bpy.types.ID, name: str) -> str:
+def stored_text(block: ID, name: str) -> str:
     """Return a text; empty if the property is missing or something else."""
     value = block.get(name)
     return value if isinstance(value, str) else ""
 
 
-def source_of(action: bpy.types.Action) -> str:
+def source_of(action: Action) -> str:
     """Return the name of the captured armature whose motion retargeting has written to an action;
     empty if unknown.
     """
     return stored_text(action, KEYS_OF)
 
 
-def start_frame(armature: bpy.types.Object) -> float:
+def start_frame(armature: Object) -> float:
     """Return the scene frame of a captured armature's timestamp 0."""
     return stored_number(armature, "scope_start", 0.0, -LAST_FRAME, LAST_FRAME)
 
 
-def stored_rate(armature: bpy.types.Object, default: float) -> float:
+def stored_rate(armature: Object, default: float) -> float:
     """Return the frame rate for which a captured armature's keys were written; the default if it is
     not stored.
     """
     return stored_number(armature, RATE, default, *RATES)
 
 
-def smoothing_of(armature: bpy.types.Object) -> float:
+def smoothing_of(armature: Object) -> float:
     """Return the strength with which a captured armature's motion was smoothed last."""
     return stored_number(armature, "scope_smoothing", 1.0, 0.0, 20.0)
 

@@ -16,8 +16,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 
-import bpy
 import numpy as np
+from bpy.types import ID, Action, FCurve, NlaStrip, Object, Scene
 
 from ..arrays import Float64Array, FloatArray, IndexArray
 from ..errors import MotionFileError, UsageError
@@ -56,7 +56,7 @@ def blender_rate(frames_per_second: float) -> tuple[int, float]:
     return fps, fps / frames_per_second
 
 
-def scene_rate(scene: bpy.types.Scene) -> float:
+def scene_rate(scene: Scene) -> float:
     """Return the frame rate of a scene, frames per second."""
     fps = scene.render.fps
     base = scene.render.fps_base
@@ -65,7 +65,7 @@ def scene_rate(scene: bpy.types.Scene) -> float:
     return float(exact) if abs(float(exact) - fps / base) < 1e-5 else fps / base
 
 
-def set_scene_rate(scene: bpy.types.Scene, frames_per_second: float) -> None:
+def set_scene_rate(scene: Scene, frames_per_second: float) -> None:
     """Set the frame rate of a scene.
 
     :raises UsageError: when Blender cannot store the rate.
@@ -73,9 +73,7 @@ def set_scene_rate(scene: bpy.types.Scene, frames_per_second: float) -> None:
     scene.render.fps, scene.render.fps_base = blender_rate(frames_per_second)
 
 
-def rows_of_scene_frames(
-    frames: Float64Array,
-) -> tuple[Float64Array, IndexArray]:
+def rows_of_scene_frames(frames: Float64Array) -> tuple[Float64Array, IndexArray]:
     """Return the whole frames (N,) of the scene during which a motion lasts, and the row of the
     pose that is nearest to each.
 
@@ -115,26 +113,26 @@ def whole_frames_of(frames: Float64Array) -> Float64Array:
     return whole if len(whole) else np.round(frames[:1])
 
 
-def store_rate(armature: bpy.types.Object, rate: float) -> None:
+def store_rate(armature: Object, rate: float) -> None:
     """Store the frame rate for which an armature's keys were written, frames per second."""
     armature[RATE] = rate
 
 
-def keyed_rate(armature: bpy.types.Object, scene: bpy.types.Scene) -> float:
+def keyed_rate(armature: Object, scene: Scene) -> float:
     """Return the frame rate for which an armature's keys were written; older files do not say, and
     have the scene's.
     """
     return stored_rate(armature, scene_rate(scene))
 
 
-def show_frame(scene: bpy.types.Scene, frame: float) -> None:
+def show_frame(scene: Scene, frame: float) -> None:
     """Set the current frame, which may lie between two whole ones, and evaluate the scene there."""
     whole = math.floor(frame)
     scene.frame_set(whole, subframe=float(frame - whole))
 
 
 @contextmanager
-def current_frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
+def current_frame_kept(scene: Scene) -> Iterator[None]:
     """Go back to the scene's current frame when the block ends."""
     frame, subframe = scene.frame_current, scene.frame_subframe
     try:
@@ -143,7 +141,7 @@ def current_frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
         scene.frame_set(frame, subframe=subframe)
 
 
-def set_frame_range(scene: bpy.types.Scene, first: float, last: float) -> None:
+def set_frame_range(scene: Scene, first: float, last: float) -> None:
     """Set the scene's frame range to that of the keys, rounded outwards to whole frames."""
     start = math.floor(first)
     end = math.ceil(last)
@@ -152,7 +150,7 @@ def set_frame_range(scene: bpy.types.Scene, first: float, last: float) -> None:
     scene.frame_end = end
 
 
-def play_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, first: int, last: int) -> None:
+def play_cycle(scene: Scene, armature: Object, first: int, last: int) -> None:
     """Set the scene's frame range to a cycle of an armature's motion, and store the range before
     it.
     """
@@ -164,12 +162,12 @@ def play_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, first: int, l
     armature[_CYCLE] = f"{scene.frame_start} {scene.frame_end} {before[0]} {before[1]}"
 
 
-def is_cycle(armature: bpy.types.Object) -> bool:
+def is_cycle(armature: Object) -> bool:
     """Return whether an armature's motion was cut to a cycle."""
     return bool(_stored_ranges(armature)[0])
 
 
-def cycle_span(armature: bpy.types.Object) -> tuple[int, int] | None:
+def cycle_span(armature: Object) -> tuple[int, int] | None:
     """Return the frames of the first and the last key of an armature's cycle, rounded; None without
     a cycle. The last key is that of the first pose once more, which is not played.
     """
@@ -177,7 +175,7 @@ def cycle_span(armature: bpy.types.Object) -> tuple[int, int] | None:
     return (cycle[0], cycle[1] + 1) if cycle else None
 
 
-def retime_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, retiming: Retiming) -> None:
+def retime_cycle(scene: Scene, armature: Object, retiming: Retiming) -> None:
     """Move the stored cycle with the armature's keys, and the scene's frame range if it is that of
     the cycle.
     """
@@ -191,7 +189,7 @@ def retime_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, retiming: R
     armature[_CYCLE] = "{} {} {} {}".format(start, end, *retiming.span(*before))
 
 
-def restore_scene_range(scene: bpy.types.Scene, armature: bpy.types.Object) -> None:
+def restore_scene_range(scene: Scene, armature: Object) -> None:
     """Restore the scene's frame range from before the cycle, unless the user has changed it
     meanwhile.
     """
@@ -202,7 +200,7 @@ def restore_scene_range(scene: bpy.types.Scene, armature: bpy.types.Object) -> N
         set_frame_range(scene, *before)
 
 
-def _stored_ranges(armature: bpy.types.Object) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def _stored_ranges(armature: Object) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return the frame range of the cycle and the one before it; both are empty without a cycle."""
     found = re.fullmatch(
         r"(-?\d{1,7}) (-?\d{1,7}) (-?\d{1,7}) "
@@ -250,7 +248,7 @@ class Retiming:
         return math.floor(self.frame(first) + _WHOLE), math.ceil(self.frame(last) - _WHOLE)
 
 
-def retime_keys(curves: Iterable[bpy.types.FCurve], retiming: Retiming) -> None:
+def retime_keys(curves: Iterable[FCurve], retiming: Retiming) -> None:
     """Move every key of curves, with its handles."""
     for curve in curves:
         keys = curve.keyframe_points
@@ -262,33 +260,33 @@ def retime_keys(curves: Iterable[bpy.types.FCurve], retiming: Retiming) -> None:
         curve.update()
 
 
-def action_strips(block: bpy.types.ID) -> list[bpy.types.NlaStrip]:
+def action_strips(block: ID) -> list[NlaStrip]:
     """Return the NLA strips of a datablock that play an action."""
     animation = getattr(block, "animation_data", None)
     tracks = animation.nla_tracks if animation is not None else ()
     return [s for track in tracks for s in track.strips if s.type == "CLIP" and s.action]
 
 
-def played_actions(block: bpy.types.ID) -> list[bpy.types.Action]:
+def played_actions(block: ID) -> list[Action]:
     """Return the actions that animate a datablock: its own, and those of its NLA strips."""
     own = action_of(block)
     strips = [strip.action for strip in action_strips(block)]
     return strips if own is None else [own, *strips]
 
 
-def retime_strip(strip: bpy.types.NlaStrip, retiming: Retiming) -> None:
+def retime_strip(strip: NlaStrip, retiming: Retiming) -> None:
     """Move an NLA strip, with the part of its action that it plays; the action's keys are not
     moved.
     """
     set_strip_ends(strip, [retiming.frame(frame) for frame in strip_ends(strip)])
 
 
-def strip_ends(strip: bpy.types.NlaStrip) -> list[float]:
+def strip_ends(strip: NlaStrip) -> list[float]:
     """Return the first and the last frame of an NLA strip, and of what it plays of its action."""
     return [strip.frame_start, strip.frame_end, strip.action_frame_start, strip.action_frame_end]
 
 
-def set_strip_ends(strip: bpy.types.NlaStrip, ends: Sequence[float]) -> None:
+def set_strip_ends(strip: NlaStrip, ends: Sequence[float]) -> None:
     """Set what `strip_ends` returns."""
     start, end, first, last = ends
     # Blender keeps the end after the start

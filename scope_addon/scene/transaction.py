@@ -16,6 +16,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import ID, Action, FCurve, Key, Object, Scene
 
 from .actions import (
     assign_action,
@@ -42,15 +43,12 @@ _CURVE = (
     "hide",
     "auto_smoothing",
 )
-_Curves = dict[tuple[str, int], bpy.types.FCurve]
+_Curves = dict[tuple[str, int], FCurve]
 
 
 @contextmanager
 def all_or_nothing(
-    scene: bpy.types.Scene,
-    *objects: bpy.types.Object,
-    keys: Sequence[bpy.types.Key] = (),
-    actions: Sequence[bpy.types.Action] = (),
+    scene: Scene, *objects: Object, keys: Sequence[Key] = (), actions: Sequence[Action] = ()
 ) -> Iterator[None]:
     """Roll back new datablocks, scene settings and changes of ``objects`` when the block raises;
     re-raise.
@@ -90,7 +88,7 @@ def all_or_nothing(
 class _SavedScene:
     """A scene's settings and markers, the selection, and the active object's mode."""
 
-    def __init__(self, scene: bpy.types.Scene) -> None:
+    def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self.layer = bpy.context.view_layer
         self._settings = {name: getattr(scene, name) for name in _SCENE}
@@ -129,7 +127,7 @@ class _SavedTransform:
     bones.
     """
 
-    def __init__(self, obj: bpy.types.Object) -> None:
+    def __init__(self, obj: Object) -> None:
         self._obj = obj
         self._parent = obj.parent
         self._parenting = obj.parent_type, obj.parent_bone
@@ -154,7 +152,7 @@ class _SavedTransform:
 class _SavedAction:
     """A copy of the content of an action in case the block changes it."""
 
-    def __init__(self, action: bpy.types.Action) -> None:
+    def __init__(self, action: Action) -> None:
         self._action = action
         self._fake_user = action.use_fake_user
         self._copy = action.copy()
@@ -180,7 +178,7 @@ class _SavedAnimation:
     strips.
     """
 
-    def __init__(self, obj: bpy.types.Object | bpy.types.Camera | bpy.types.Key) -> None:
+    def __init__(self, obj: Object | bpy.types.Camera | Key) -> None:
         self._obj = obj
         data = obj.animation_data
         self._had_data = data is not None
@@ -209,13 +207,13 @@ class _SavedAnimation:
             self._content.discard_copy()
 
 
-def _restorable(owner: bpy.types.bpy_struct) -> dict[str, bool | int | float | str | bpy.types.ID]:
+def _restorable(owner: bpy.types.bpy_struct) -> dict[str, bool | int | float | str | ID]:
     """Return the custom properties that are single values or datablocks."""
-    kinds = (bool, int, float, str, bpy.types.ID)
+    kinds = (bool, int, float, str, ID)
     return {name: owner[name] for name in owner.keys() if isinstance(owner[name], kinds)}
 
 
-def restore_content(action: bpy.types.Action, copy: bpy.types.Action) -> None:
+def restore_content(action: Action, copy: Action) -> None:
     """Give an action the curves of an earlier copy of it; curves that are the same are not touched.
 
     :param action: since the copy was made, it has lost no slot, layer or strip.
@@ -229,7 +227,7 @@ def restore_content(action: bpy.types.Action, copy: bpy.types.Action) -> None:
             setattr(action, name, getattr(copy, name))
 
 
-def _owners(action: bpy.types.Action) -> Iterator[tuple[tuple[int, int, int], Any]]:
+def _owners(action: Action) -> Iterator[tuple[tuple[int, int, int], Any]]:
     """Yield what has ``fcurves`` and ``groups``, with its place: the action itself, or the
     channelbag of each slot.
     """
@@ -242,7 +240,7 @@ def _owners(action: bpy.types.Action) -> Iterator[tuple[tuple[int, int, int], An
                 yield (row, column, bag.slot_handle), bag
 
 
-def _remove_new_containers(action: bpy.types.Action, copy: bpy.types.Action) -> None:
+def _remove_new_containers(action: Action, copy: Action) -> None:
     """Remove the slots and layers, with their channelbags, that the copy does not have."""
     if not has_slots():
         return
@@ -277,7 +275,7 @@ def _restore_curves(owner: Any, wanted: Any) -> None:
             write_modifiers(curve, modifiers)
 
 
-def _restore_keys(curve: bpy.types.FCurve, source: bpy.types.FCurve) -> None:
+def _restore_keys(curve: FCurve, source: FCurve) -> None:
     wanted = read_whole_keys(source)
     present = read_whole_keys(curve)
     if not all(np.array_equal(present[name], wanted[name]) for name in wanted):

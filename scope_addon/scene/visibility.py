@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
+from bpy.types import Object, Scene, ViewLayer
 from mathutils import Matrix
 
 from .datablocks import found, is_in_layer, is_part
@@ -22,7 +23,7 @@ _STAYS = 1
 _COMES_BACK = 2
 
 
-def hide(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:
+def hide(armature: Object, view_layer: ViewLayer) -> None:
     """Hide a captured armature and its body in viewports and renders."""
     for obj in _person(armature, view_layer):
         if not obj.hide_get(view_layer=view_layer) or not obj.hide_render:
@@ -31,9 +32,7 @@ def hide(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:
         obj.hide_render = True
 
 
-def show(
-    armature: bpy.types.Object, view_layer: bpy.types.ViewLayer, *, temporarily: bool = False
-) -> None:
+def show(armature: Object, view_layer: ViewLayer, *, temporarily: bool = False) -> None:
     """Show what ``hide`` has hidden.
 
     :param temporarily: until ``hide_again``.
@@ -49,7 +48,7 @@ def show(
         obj.hide_render = False
 
 
-def hide_again(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:
+def hide_again(armature: Object, view_layer: ViewLayer) -> None:
     """Hide what was shown temporarily."""
     if armature.get(_HIDDEN) == _COMES_BACK:
         hide(armature, view_layer)
@@ -57,7 +56,7 @@ def hide_again(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> N
             obj[_HIDDEN] = _STAYS
 
 
-def _person(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+def _person(armature: Object, view_layer: ViewLayer) -> list[Object]:
     """Return armature and body, without objects outside the view layer, which cannot be hidden, and
     without what the user has parented to the armature.
     """
@@ -68,7 +67,7 @@ def _person(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list
 
 
 @contextmanager
-def evaluated(obj: bpy.types.Object) -> Iterator[None]:
+def evaluated(obj: Object) -> Iterator[None]:
     """Let Blender evaluate an object inside the block, also one that is hidden or excluded.
 
     Otherwise, such an object does not follow its animation and its parents, and is at the origin
@@ -85,7 +84,7 @@ def evaluated(obj: bpy.types.Object) -> Iterator[None]:
         obj.hide_viewport = False
         if is_added:
             shown.link(obj)
-        above: bpy.types.Object | None = obj
+        above: Object | None = obj
         while above is not None:
             above.update_tag(refresh={"OBJECT", "TIME"})
             above = above.parent
@@ -97,7 +96,7 @@ def evaluated(obj: bpy.types.Object) -> Iterator[None]:
         bpy.context.view_layer.update()  # it would still list the object
 
 
-def world_matrix(obj: bpy.types.Object) -> Matrix:
+def world_matrix(obj: Object) -> Matrix:
     """Return an object's transform (4, 4) to the world at the current frame, also of a hidden
     one.
     """
@@ -106,7 +105,7 @@ def world_matrix(obj: bpy.types.Object) -> Matrix:
         return obj.matrix_world.copy()
 
 
-def select_only(layer: bpy.types.ViewLayer, chosen: bpy.types.Object) -> None:
+def select_only(layer: ViewLayer, chosen: Object) -> None:
     """Make an object the active and the only selected one."""
     layer.update()
     for obj in layer.objects:
@@ -151,7 +150,7 @@ class SceneBefore:
 
 
 @contextmanager
-def window_shows(scene: bpy.types.Scene) -> Iterator[None]:
+def window_shows(scene: Scene) -> Iterator[None]:
     """Show a scene in the window inside the block, and the former one, as it was, after it.
 
     Viewports that look through a camera leave it where the other scene has none; they look through

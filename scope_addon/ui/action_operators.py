@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
+from bpy.types import Collection, Context, Event, Object, Operator
 
 from ...solver.errors import ScopeError
 from ..errors import UsageError
@@ -18,7 +19,7 @@ from .captures import show_again, shown_capture
 from .reporting import ReportingOperator, refuse, rpt_
 
 
-def animated_armature(context: bpy.types.Context) -> bpy.types.Object | None:
+def animated_armature(context: Context) -> Object | None:
     """Return the active rig with captured motion, or else the active captured armature; None
     without one.
     """
@@ -31,7 +32,7 @@ class ActionOperator(ReportingOperator):
     """An operator on the action of an armature with captured motion. Not registered"""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require an armature with captured motion, which is stored in this file and has an
         action.
         """
@@ -62,7 +63,7 @@ class SCOPE_OT_push_to_nla(ActionOperator):
     bl_idname = "scope.push_to_nla"
     bl_label = "Push to NLA"
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Add the track, and those of the root object and of the face, which the motion's strips
         are moved with.
 
@@ -92,7 +93,7 @@ class CaptureOperator(ReportingOperator):
     """An operator on the capture that the panel shows. Not registered"""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a capture that is stored in this file."""
         collection = context.scene.scope.result.collection
         if collection is None:
@@ -111,17 +112,17 @@ class SCOPE_OT_rename_take(CaptureOperator):
 
     name: StringProperty(name="Name", description="New name of the take")
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Ask for the name."""
         self.name = context.scene.scope.result.collection.name
         return context.window_manager.invoke_props_dialog(self)
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, _context: Context) -> None:
         """Draw the name, which is typed over at once."""
         self.layout.activate_init = True
         self.layout.prop(self, "name", text="")
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Rename everything whose name begins with the take's.
 
         :raises UsageError: the name is empty.
@@ -142,7 +143,7 @@ class SCOPE_OT_delete_capture(CaptureOperator):
     bl_idname = "scope.delete_capture"
     bl_label = "Delete Capture"
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Remove it, and show the capture before it."""
         from ..scene.build import delete_capture
 
@@ -155,7 +156,7 @@ class SCOPE_OT_delete_capture(CaptureOperator):
         return rpt_("Removed '{name}'", name=name)
 
 
-def _rename(collection: bpy.types.Collection, name: str) -> None:
+def _rename(collection: Collection, name: str) -> None:
     """Rename a capture, and its objects, their data and actions whose names begin with its name, or
     with the one that it was built or renamed with: in the Outliner, its collection alone is
     renamed.
@@ -178,9 +179,7 @@ def _rename(collection: bpy.types.Collection, name: str) -> None:
     follow_renaming({before: obj.name for before, obj in armatures.items()})
 
 
-def _offered_catalogs(
-    _operator: bpy.types.Operator, _context: bpy.types.Context, typed: str
-) -> list[str]:
+def _offered_catalogs(_operator: Operator, _context: Context, typed: str) -> list[str]:
     """Return the asset catalogs whose paths contain what was typed so far, for Blender to
     suggest.
     """
@@ -218,7 +217,7 @@ class SCOPE_OT_mark_asset(ActionOperator):
         options={"SKIP_SAVE"},
     )
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Ask for the details; suggest those of the action if it is an asset."""
         from ..scene.action_asset import catalogs
 
@@ -233,7 +232,7 @@ class SCOPE_OT_mark_asset(ActionOperator):
             self.catalog = paths.get(data.catalog_id, "")
         return context.window_manager.invoke_props_dialog(self)
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Mark the action and draw its picture.
 
         :raises UsageError: the action is linked, or the catalog does not exist.
@@ -253,7 +252,7 @@ class SCOPE_OT_mark_asset(ActionOperator):
             )
         return rpt_("'{action}' is now an asset", action=action.name)
 
-    def _frame(self, context: bpy.types.Context, armature: bpy.types.Object) -> float:
+    def _frame(self, context: Context, armature: Object) -> float:
         """Return the scene frame of the picture, within the action."""
         from ..scene.action_asset import first_reliable_frame
         from ..scene.timing import keyed_rate
@@ -272,14 +271,14 @@ class SCOPE_OT_mark_asset(ActionOperator):
         return float(min(max(frame, first), last))
 
 
-def _captured(armature: bpy.types.Object) -> bpy.types.Object:
+def _captured(armature: Object) -> Object:
     """Return the captured armature whose motion an armature has; the armature itself if that is
     unknown.
     """
     return stored_person(armature) or armature
 
 
-def _described(context: bpy.types.Context, armature: bpy.types.Object) -> str:
+def _described(context: Context, armature: Object) -> str:
     """Return the description of an asset that the user has given none"""
     first, last = armature.animation_data.action.frame_range
     seconds = (last - first) * context.scene.render.fps_base / context.scene.render.fps

@@ -17,6 +17,7 @@ from uuid import uuid4
 
 import bpy
 import numpy as np
+from bpy.types import Object, PropertyGroup, Scene, ViewLayer
 
 from ..arrays import BoolArray, Float64Array
 from ..capture_report import Report
@@ -56,7 +57,7 @@ _MAX_SPANS = 12  # buttons of one warning in the panel
 class CaptureJob:
     """A capture for one scene, with the current settings of the scene."""
 
-    def __init__(self, scene: bpy.types.Scene) -> None:
+    def __init__(self, scene: Scene) -> None:
         """Start the worker, or find the finished capture in the cache.
 
         :raises ScopeError: a setting is invalid, or the worker cannot be started.
@@ -159,7 +160,7 @@ class CaptureJob:
             return  # on Windows, while the worker replaces the file
         show_preview(pixels, message["width"], message["height"])
 
-    def _build(self, scene: bpy.types.Scene, captured: CachedCapture) -> None:
+    def _build(self, scene: Scene, captured: CachedCapture) -> None:
         report = Report.from_json(captured.report)
         options = self._options
         if self._is_automatic:  # the user may have begun to animate during the capture
@@ -183,7 +184,7 @@ class Selection:
     mode.
     """
 
-    def __init__(self, scene: bpy.types.Scene) -> None:
+    def __init__(self, scene: Scene) -> None:
         self._is_shown = bpy.context.scene == scene
         layer = bpy.context.view_layer if self._is_shown else scene.view_layers[0]
         active = layer.objects.active
@@ -204,12 +205,12 @@ class Selection:
         return bool(self._selected) and now != before
 
 
-def _selected_objects(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+def _selected_objects(layer: ViewLayer) -> list[Object]:
     return [obj for obj in layer.objects if obj.select_get(view_layer=layer)]
 
 
 @contextmanager
-def selection_kept(scene: bpy.types.Scene) -> Iterator[None]:
+def selection_kept(scene: Scene) -> Iterator[None]:
     """Keep the selection, the active object, its mode and the current frame while a capture is
     built, and show other captures that something is selected of.
     """
@@ -234,7 +235,7 @@ def selection_kept(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 def build_capture(
-    scene: bpy.types.Scene,
+    scene: Scene,
     contents: Sequence[tuple[Path, bytes]],
     body: str,
     footage: str,
@@ -265,7 +266,7 @@ def build_capture(
 
 
 def show_build(
-    scene: bpy.types.Scene,
+    scene: Scene,
     result: BuildResult,
     footage: str,
     report: Report,
@@ -289,7 +290,7 @@ def show_build(
     scene.scope.capture = result.collection
 
 
-def capture_request(scene: bpy.types.Scene) -> JobRequest:
+def capture_request(scene: Scene) -> JobRequest:
     """Make the request to the worker from the scene's settings and the preferences.
 
     :raises UsageError: the scene is linked, no footage, calibration, camera or body file is chosen,
@@ -324,7 +325,7 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
     return JobRequest(str(footage), [str(view) for view in views], **values)
 
 
-def chosen_values(scene: bpy.types.Scene) -> dict[str, Any]:
+def chosen_values(scene: Scene) -> dict[str, Any]:
     """Return the values of a worker's options from the scene's settings and the preferences.
 
     :raises UsageError: no body or calibration file is chosen.
@@ -344,7 +345,7 @@ def chosen_values(scene: bpy.types.Scene) -> dict[str, Any]:
     return values
 
 
-def build_options(scene: bpy.types.Scene) -> BuildOptions:
+def build_options(scene: Scene) -> BuildOptions:
     """Make the options of building the scene from its settings."""
     settings = scene.scope
     frame_rate = settings.frame_rate.lower()
@@ -361,14 +362,12 @@ def build_options(scene: bpy.types.Scene) -> BuildOptions:
     )
 
 
-def _automatic_frame_rate(scene: bpy.types.Scene) -> str:
+def _automatic_frame_rate(scene: Scene) -> str:
     """Return the policy of the rate, with which another animation keeps its speed."""
     return "keep" if is_animated(scene) else "set"
 
 
-def show_result(
-    shown: bpy.types.PropertyGroup, footage: str, report: Report, result: BuildResult
-) -> None:
+def show_result(shown: PropertyGroup, footage: str, report: Report, result: BuildResult) -> None:
     """Fill the properties that the result panel shows.
 
     :param shown: the properties, which are overwritten.

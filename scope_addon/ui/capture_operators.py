@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import bpy
 from bpy.props import IntProperty
+from bpy.types import Context, Event, Operator, Panel, Scene
 
 from ...solver.errors import ScopeError
 from ..errors import UsageError
@@ -58,7 +59,7 @@ class _State(JobState):
 state = _State()
 
 
-def nothing_runs(cls: type[bpy.types.Operator]) -> bool:
+def nothing_runs(cls: type[Operator]) -> bool:
     """Return whether no capture is running, live or not; if one is, say so as the reason why the
     operator cannot be used.
     """
@@ -74,7 +75,7 @@ def end_capture() -> None:
     state.message = ""
 
 
-def _set_footage(operator: bpy.types.Operator, context: bpy.types.Context, path: str) -> None:
+def _set_footage(operator: Operator, context: Context, path: str) -> None:
     """Set the footage to a file. What is a place in the picture and videos of other cameras belong
     to the footage before: they are removed, of which the operator reports the latter.
     """
@@ -91,14 +92,14 @@ def _set_footage(operator: bpy.types.Operator, context: bpy.types.Context, path:
         operator.report({"INFO"}, text)
 
 
-class SCOPE_OT_choose_footage(SeveralFootageBrowser, bpy.types.Operator):
+class SCOPE_OT_choose_footage(SeveralFootageBrowser, Operator):
     """Choose a video or image of a person, or several that are captured one after the other"""
 
     bl_idname = "scope.choose_footage"
     bl_label = "Choose Footage"  # short: the button of the file browser shows it, too
     bl_options = {"UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Set the footage to the file, and queue the files if there are several."""
         paths = chosen_files(self)
         if not paths:
@@ -114,7 +115,7 @@ class SCOPE_OT_choose_footage(SeveralFootageBrowser, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_OT_add_view(SeveralFootageBrowser, bpy.types.Operator):
+class SCOPE_OT_add_view(SeveralFootageBrowser, Operator):
     """Add a video of the same moment by another camera. All cameras must stand still"""
 
     bl_idname = "scope.add_view"
@@ -122,7 +123,7 @@ class SCOPE_OT_add_view(SeveralFootageBrowser, bpy.types.Operator):
     bl_options = {"UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require footage, and that there may be another view."""
         settings = context.scene.scope
         if not settings.footage:
@@ -131,7 +132,7 @@ class SCOPE_OT_add_view(SeveralFootageBrowser, bpy.types.Operator):
             return refuse(cls, "There are at most eight cameras")
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Add the chosen files."""
         settings = context.scene.scope
         paths = chosen_files(self)
@@ -154,7 +155,7 @@ class _RemoveFromList:
 
     index: IntProperty(min=0, options={"SKIP_SAVE", "HIDDEN"})
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Remove the entry."""
         entries = getattr(context.scene.scope, self.listed)
         if self.index >= len(entries):
@@ -163,7 +164,7 @@ class _RemoveFromList:
         return {"FINISHED"}
 
 
-class SCOPE_OT_remove_view(_RemoveFromList, bpy.types.Operator):
+class SCOPE_OT_remove_view(_RemoveFromList, Operator):
     """Remove this video from the list; the file stays"""
 
     bl_idname = "scope.remove_view"
@@ -171,14 +172,14 @@ class SCOPE_OT_remove_view(_RemoveFromList, bpy.types.Operator):
     listed = "views"
 
 
-class SCOPE_OT_use_sample(bpy.types.Operator):
+class SCOPE_OT_use_sample(Operator):
     """Use the short clip that is included with Scope"""
 
     bl_idname = "scope.use_sample"
     bl_label = "Try the Sample Clip"
     bl_options = {"UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Set the footage to the sample clip."""
         _set_footage(self, context, str(SAMPLE))
         return {"FINISHED"}
@@ -194,7 +195,7 @@ class CapturingOperator(JobOperator):
     _pause_s = 0.0  # after it, until the next drawing
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require that footage is chosen and nothing is running."""
         if not nothing_runs(cls):
             return False
@@ -202,7 +203,7 @@ class CapturingOperator(JobOperator):
             return refuse(cls, "Choose a video or image first")
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Capture from a script, and wait for the result."""
         if not self.start(context):
             return {"CANCELLED"}
@@ -213,11 +214,11 @@ class CapturingOperator(JobOperator):
         finally:
             state.stop()
 
-    def start(self, context: bpy.types.Context) -> bool:
+    def start(self, context: Context) -> bool:
         """Start the job; return whether that worked."""
         return self.begin(context.scene)
 
-    def begin(self, scene: bpy.types.Scene) -> bool:
+    def begin(self, scene: Scene) -> bool:
         """Start the job for a scene with its settings; return whether that worked."""
         state.message = ""
         state.scene_uid = scene.session_uid
@@ -237,7 +238,7 @@ class CapturingOperator(JobOperator):
             return self.fail(error)
         return True
 
-    def step(self, context: bpy.types.Context) -> set[str] | None:
+    def step(self, context: Context) -> set[str] | None:
         """Advance the job, and show its progress; return None while it is running, and then the
         outcome.
         """
@@ -292,7 +293,7 @@ class CapturingOperator(JobOperator):
         """Say that nothing has changed."""
         self.report({"INFO"}, "Capture cancelled; the scene is unchanged")
 
-    def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+    def end(self, context: Context, outcome: set[str]) -> set[str]:
         """Stop the job and the timer, show what was built, and return the outcome."""
         if "FINISHED" in outcome:
             show_new_capture(context, _scene_of_job())
@@ -320,7 +321,7 @@ class SCOPE_OT_capture_queue(CapturingOperator):
     _ended: dict[str, tuple[str, str]]
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a clip that waits, of one camera, and that nothing is running."""
         if not super().poll(context):
             return False
@@ -333,7 +334,7 @@ class SCOPE_OT_capture_queue(CapturingOperator):
             return refuse(cls, "Choose a folder for the files")
         return True
 
-    def start(self, context: bpy.types.Context) -> bool:
+    def start(self, context: Context) -> bool:
         """Start the first clip; those that failed before are tried again."""
         self._ended = {}
         for clip in context.scene.scope.queue:
@@ -341,7 +342,7 @@ class SCOPE_OT_capture_queue(CapturingOperator):
                 clip.status = WAITING
         return super().start(context)
 
-    def begin(self, scene: bpy.types.Scene) -> bool:
+    def begin(self, scene: Scene) -> bool:
         """Start the first clip that waits and can be started; return whether there is one."""
         for clip in scene.scope.queue:
             if clip.footage in self._ended:
@@ -394,7 +395,7 @@ class SCOPE_OT_capture_queue(CapturingOperator):
             return None
         return {"FINISHED"} if self._finished else {"CANCELLED"}
 
-    def _write_files(self, scene: bpy.types.Scene) -> str:
+    def _write_files(self, scene: Scene) -> str:
         """Write the files of the clip that was captured last, if there shall be any; return why
         that failed, or an empty text.
         """
@@ -430,7 +431,7 @@ class SCOPE_OT_capture_queue(CapturingOperator):
             return
         self.report({"INFO"}, "Capture cancelled; the clips captured before stay in the scene")
 
-    def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+    def end(self, context: Context, outcome: set[str]) -> set[str]:
         """Let a cancelled clip wait again, and end as a single capture does."""
         clip = self._listed_clip()
         if clip is not None and self._clip not in self._ended:
@@ -438,7 +439,7 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         return super().end(context, outcome)
 
 
-class SCOPE_OT_remove_clip(_RemoveFromList, bpy.types.Operator):
+class SCOPE_OT_remove_clip(_RemoveFromList, Operator):
     """Remove this clip from the list; the file and its capture stay"""
 
     bl_idname = "scope.remove_clip"
@@ -453,30 +454,30 @@ def _folder_of_files(settings: Any) -> str:
     return bpy.path.abspath(settings.queue_folder)
 
 
-def _scene_of_job() -> bpy.types.Scene | None:
+def _scene_of_job() -> Scene | None:
     """Return the scene that the running job belongs to; None if it was removed."""
     return found("scenes", "", state.scene_uid)
 
 
-class SCOPE_OT_cancel(bpy.types.Operator):
+class SCOPE_OT_cancel(Operator):
     """Cancel the capture; the scene stays unchanged"""
 
     bl_idname = "scope.cancel"
     bl_label = "Cancel Capture"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require that a capture is running."""
         return state.job is not None
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Ask first if the capture has run for a while."""
         if time.monotonic() - state.started <= ASK_AFTER_S or bpy.app.background:
             return self.execute(context)
         ask_to_stop()
         return {"INTERFACE"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """End the worker, and ask the modal operator to end."""
         assert state.job is not None
         state.job.cancelled = True
@@ -484,19 +485,19 @@ class SCOPE_OT_cancel(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_OT_keep_capturing(bpy.types.Operator):
+class SCOPE_OT_keep_capturing(Operator):
     """Continue the capture"""
 
     bl_idname = "scope.keep_capturing"
     bl_label = "Keep Capturing"
     bl_options = {"INTERNAL"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Do nothing: the question closes."""
         return {"FINISHED"}
 
 
-class SCOPE_PT_stop_capture(bpy.types.Panel):
+class SCOPE_PT_stop_capture(Panel):
     """The question before a capture that has run for a while is stopped. Escape closes it, and the
     capture goes on.
     """
@@ -507,7 +508,7 @@ class SCOPE_PT_stop_capture(bpy.types.Panel):
     bl_label = "Stop the Capture?"
     bl_ui_units_x = 16
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw both answers; Return gives the one that was asked for."""
         from ..job.job_progress import duration
 
@@ -532,7 +533,7 @@ def ask_to_stop() -> None:
     bpy.ops.wm.call_panel(name=SCOPE_PT_stop_capture.bl_idname, keep_open=False)
 
 
-class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
+class SCOPE_OT_import_video(FootageBrowser, Operator):
     """Motion capture: animate a body with the motion of the person in a video or image"""
 
     bl_idname = "scope.import_video"
@@ -540,15 +541,15 @@ class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
     bl_options = {"UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require that no capture is running."""
         return nothing_runs(cls)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Ask for the file."""
         return self.ask(context)
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the settings of the capture in the sidebar of the file browser."""
         layout = split(self.layout)
         settings = context.scene.scope
@@ -556,7 +557,7 @@ class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
             if name != "people_count" or settings.people == "COUNT":
                 layout.prop(settings, name)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Set the footage to the file, and start the capture."""
         path = Path(bpy.path.abspath(self.filepath))
         if not os.path.isfile(path):  # Path.is_file raises where a name is too long

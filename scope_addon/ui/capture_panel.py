@@ -24,6 +24,7 @@ from bpy.props import (
     PointerProperty,
     StringProperty,
 )
+from bpy.types import Collection, Context, Object, Operator, Panel, PropertyGroup, UILayout
 
 from ..footage import display_text
 from ..options import Place, Section, options_at
@@ -77,24 +78,24 @@ class PersonTab(Tab):
     """A panel about a captured person."""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a captured person."""
         return has_captured_person(context)
 
 
-class SCOPE_PT_capture(Tab, bpy.types.Panel):
+class SCOPE_PT_capture(Tab, Panel):
     """Footage, the capture button, progress."""
 
     bl_idname = "SCOPE_PT_capture"
     bl_label = "Capture"
     bl_order = 0
 
-    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+    def draw_header_preset(self, _context: Context) -> None:
         """Draw the buttons of the guide and the presets in the header."""
         self.layout.operator("scope.documentation", text="", icon="HELP", emboss=False)
         SCOPE_PT_capture_presets.draw_panel_header(self.layout)
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the panel."""
         layout = self.layout
         settings = context.scene.scope
@@ -127,7 +128,7 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
             draw_text(context, layout.box(), message, "ERROR")
 
 
-def _draw_view(layout: bpy.types.UILayout, view: bpy.types.PropertyGroup, index: int) -> None:
+def _draw_view(layout: UILayout, view: PropertyGroup, index: int) -> None:
     """Draw a further video, and its offset if it is known."""
     row = layout.row(align=True)
     row.prop(view, "footage_text", text="", icon="VIEW_CAMERA")
@@ -137,9 +138,7 @@ def _draw_view(layout: bpy.types.UILayout, view: bpy.types.PropertyGroup, index:
         layout.prop(view, "offset_s")
 
 
-def _draw_queue(
-    context: bpy.types.Context, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup
-) -> None:
+def _draw_queue(context: Context, layout: UILayout, settings: PropertyGroup) -> None:
     """Draw the clips that are captured one after the other, why some were not, and which files are
     written.
     """
@@ -157,9 +156,7 @@ def _draw_queue(
         row.prop(settings, "queue_folder", text="", placeholder=iface_("Folder"))
 
 
-def _draw_progress(
-    context: bpy.types.Context, layout: bpy.types.UILayout, progress: JobProgress
-) -> None:
+def _draw_progress(context: Context, layout: UILayout, progress: JobProgress) -> None:
     layout.progress(text=f"{100 * progress.fraction:.0f} %", factor=progress.fraction)
     if icon := preview_icon():
         layout.template_icon(icon_value=icon, scale=10.0)
@@ -170,7 +167,7 @@ def _draw_progress(
     row.operator("scope.cancel", text="Cancel", icon="CANCEL")
 
 
-class SCOPE_PT_person(Tab, bpy.types.Panel):
+class SCOPE_PT_person(Tab, Panel):
     """People, body, lens, and the part of the video."""
 
     bl_idname = "SCOPE_PT_person"
@@ -178,7 +175,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
     bl_label = "Options"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the panel."""
         layout = split(self.layout)
         settings = context.scene.scope
@@ -214,7 +211,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
             column.prop(settings, "range_end")
 
 
-class SCOPE_PT_scene(Tab, bpy.types.Panel):
+class SCOPE_PT_scene(Tab, Panel):
     """Settings of the scene that a capture may change."""
 
     bl_idname = "SCOPE_PT_scene"
@@ -222,7 +219,7 @@ class SCOPE_PT_scene(Tab, bpy.types.Panel):
     bl_label = "Scene"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the panel."""
         layout = split(self.layout)
         settings = context.scene.scope
@@ -230,18 +227,18 @@ class SCOPE_PT_scene(Tab, bpy.types.Panel):
         draw_section(layout, settings, Section.SCENE)
 
 
-class SCOPE_PT_result(Tab, bpy.types.Panel):
+class SCOPE_PT_result(Tab, Panel):
     """The captures of the scene, the result of the selected one, and its export."""
 
     bl_idname = "SCOPE_PT_result"
     bl_label = "Result"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a capture in this scene: copied settings may refer to another scene's."""
         return shown_capture(context.scene) is not None
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the panel."""
         layout = self.layout
         draw_captures(layout, context)
@@ -272,7 +269,7 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
         row.operator("scope.delete_capture", text="", icon="TRASH")
 
 
-def _draw_compared(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+def _draw_compared(context: Context, layout: UILayout) -> None:
     """Draw how opaque the compared footage is, and the choice among several cameras."""
     cameras = cameras_of(context.scene)
     compared = context.scene.camera
@@ -287,7 +284,7 @@ def _draw_compared(context: bpy.types.Context, layout: bpy.types.UILayout) -> No
         layout.prop(background, "alpha", text="Footage Opacity", slider=True)
 
 
-def _draw_frame_rate(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+def _draw_frame_rate(context: Context, layout: UILayout) -> None:
     """Draw what is to be known of the scene's frame rate, and the button that sets it."""
     scene = context.scene
     was = keyed_for(scene)
@@ -303,7 +300,7 @@ def _draw_frame_rate(context: bpy.types.Context, layout: bpy.types.UILayout) -> 
         layout.operator("scope.match_frame_rate", icon="TIME")
 
 
-class SCOPE_PT_warnings(Tab, bpy.types.Panel):
+class SCOPE_PT_warnings(Tab, Panel):
     """Warnings about the shown capture."""
 
     bl_idname = "SCOPE_PT_warnings"
@@ -312,21 +309,21 @@ class SCOPE_PT_warnings(Tab, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require warnings."""
         return len(context.scene.scope.result.warnings) > 0
 
-    def draw_header_preset(self, context: bpy.types.Context) -> None:
+    def draw_header_preset(self, context: Context) -> None:
         """Draw their number in the header, which is visible while the panel is closed."""
         self.layout.label(text=str(len(context.scene.scope.result.warnings)), icon="ERROR")
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the panel."""
         for warning in context.scene.scope.result.warnings:
             _draw_warning(context, self.layout.box(), warning)
 
 
-class SCOPE_PT_figures(Tab, bpy.types.Panel):
+class SCOPE_PT_figures(Tab, Panel):
     """People, frames, error and lens of the shown capture."""
 
     bl_idname = "SCOPE_PT_figures"
@@ -334,16 +331,14 @@ class SCOPE_PT_figures(Tab, bpy.types.Panel):
     bl_label = "Details"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the panel."""
         _draw_figures(context, self.layout, context.scene.scope.result)
         if len(cameras_of(context.scene)) > 1:
             self.layout.operator("scope.save_calibration", icon="FILE_TICK")
 
 
-def _draw_figures(
-    context: bpy.types.Context, layout: bpy.types.UILayout, result: bpy.types.PropertyGroup
-) -> None:
+def _draw_figures(context: Context, layout: UILayout, result: PropertyGroup) -> None:
     """Draw footage, people, frames and error. A .blend file written by the command line has no
     figures.
     """
@@ -384,9 +379,7 @@ def _draw_figures(
         )
 
 
-def _draw_warning(
-    context: bpy.types.Context, box: bpy.types.UILayout, warning: bpy.types.PropertyGroup
-) -> None:
+def _draw_warning(context: Context, box: UILayout, warning: PropertyGroup) -> None:
     """Draw a warning, and for each of its spans a button that goes to the first frame."""
     draw_text(context, box, warning_text(stored_warning(warning)), "ERROR")
     if warning.spans:
@@ -395,9 +388,7 @@ def _draw_warning(
             grid.operator("scope.go_to_frame", text=str(span)).frame = span.first
 
 
-def draw_text(
-    context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = "NONE"
-) -> None:
+def draw_text(context: Context, layout: UILayout, text: str, icon: str = "NONE") -> None:
     """Draw a sentence, wrapped to the width of the sidebar."""
     import textwrap  # not while Blender starts
 
@@ -412,7 +403,7 @@ def draw_text(
         column.label(text=line, icon=icon if index == 0 or icon == "NONE" else "BLANK1")
 
 
-class SCOPE_PT_capture_presets(PresetPanel, bpy.types.Panel):
+class SCOPE_PT_capture_presets(PresetPanel, Panel):
     """Presets of the capture settings."""
 
     bl_label = "Capture Presets"
@@ -420,7 +411,7 @@ class SCOPE_PT_capture_presets(PresetPanel, bpy.types.Panel):
     preset_operator = "script.execute_preset"
     preset_add_operator = "scope.add_capture_preset"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the presets. Without a folder for them, Blender would complain of missing paths
         before the first one.
         """
@@ -432,7 +423,7 @@ class SCOPE_PT_capture_presets(PresetPanel, bpy.types.Panel):
         PresetPanel.draw(self, context)
 
 
-class SCOPE_OT_add_capture_preset(AddPresetBase, bpy.types.Operator):
+class SCOPE_OT_add_capture_preset(AddPresetBase, Operator):
     """Add the capture settings as a preset, or remove a preset"""
 
     bl_idname = "scope.add_capture_preset"
@@ -448,12 +439,12 @@ class SCOPE_OT_add_capture_preset(AddPresetBase, bpy.types.Operator):
     ]
 
 
-def _clear_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+def _clear_message(_settings: PropertyGroup, _context: Context) -> None:
     """Clear the error message, which was about other footage."""
     state.message = ""
 
 
-class SCOPE_PG_warning(bpy.types.PropertyGroup):
+class SCOPE_PG_warning(PropertyGroup):
     """A warning about the result."""
 
     text: StringProperty()  # in English
@@ -461,7 +452,7 @@ class SCOPE_PG_warning(bpy.types.PropertyGroup):
     spans: StringProperty()  # scene frames; see `stored_values`
 
 
-class SCOPE_PG_result(bpy.types.PropertyGroup):
+class SCOPE_PG_result(PropertyGroup):
     """Result of a capture, stored with its collection."""
 
     footage: StringProperty(subtype="FILE_PATH")
@@ -479,12 +470,12 @@ class SCOPE_PG_result(bpy.types.PropertyGroup):
     warnings: CollectionProperty(type=SCOPE_PG_warning)
 
     @property
-    def collection(self) -> bpy.types.Collection | None:
+    def collection(self) -> Collection | None:
         """The capture; None if this is the empty result of a scene without captures."""
-        return self.id_data if isinstance(self.id_data, bpy.types.Collection) else None
+        return self.id_data if isinstance(self.id_data, Collection) else None
 
 
-class SCOPE_PG_view(bpy.types.PropertyGroup):
+class SCOPE_PG_view(PropertyGroup):
     """A further video of the same moment, and the offset of its clock."""
 
     footage: StringProperty(
@@ -510,7 +501,7 @@ class SCOPE_PG_view(bpy.types.PropertyGroup):
     )
 
 
-class SCOPE_PG_clip(bpy.types.PropertyGroup):
+class SCOPE_PG_clip(PropertyGroup):
     """A clip of several that are captured one after the other."""
 
     footage: StringProperty(subtype="FILE_PATH", options=PATH_OPTIONS, **_FOOTAGE)
@@ -519,7 +510,7 @@ class SCOPE_PG_clip(bpy.types.PropertyGroup):
 
 
 @with_options(Place.PANEL)
-class SCOPE_PG_settings(bpy.types.PropertyGroup):
+class SCOPE_PG_settings(PropertyGroup):
     """The settings of a capture: the footage, the declared options of the panel, and the capture
     that is shown.
     """
@@ -551,7 +542,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
     )
     capture: PointerProperty(
         name="Capture",
-        type=bpy.types.Collection,
+        type=Collection,
         description="Capture whose result the panel shows",
     )
     capture_index: IntProperty(
@@ -562,7 +553,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
     )
     scene_camera: PointerProperty(
         name="Scene Camera",
-        type=bpy.types.Object,
+        type=Object,
         poll=lambda _, owner: owner.type == "CAMERA",
         description="Camera whose lens and motion are those of the camera that filmed the footage",
     )

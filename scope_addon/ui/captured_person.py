@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import IntProperty
+from bpy.types import Context, Event, Object, Operator, Scene, UILayout
 
 from ...solver.errors import ScopeError
 from ..errors import UsageError
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 PERSON = "scope_person"
 
 
-def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
+def captured_armature(context: Context) -> Object | None:
     """Return the captured armature of the active object, or else the only one of the selected
     capture or scene.
     """
@@ -49,14 +50,14 @@ def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
     return last[0] if len(last) == 1 else found[0] if len(found) == 1 else None
 
 
-def stored_person(rig: bpy.types.Object) -> bpy.types.Object | None:
+def stored_person(rig: Object) -> Object | None:
     """Return the captured armature that a rig was retargeted from; None if it was deleted.
 
     Blender does not save what a library override of a rig stores, so that an opened file has what
     the library stores; it saves the override's own action.
     """
     stored = rig.get(PERSON)
-    person = stored if isinstance(stored, bpy.types.Object) else None
+    person = stored if isinstance(stored, Object) else None
     action = action_of(rig)
     if rig.override_library is None or action is None or action.library is not None:
         return person
@@ -68,7 +69,7 @@ def stored_person(rig: bpy.types.Object) -> bpy.types.Object | None:
     return own or bpy.data.objects.get(name)
 
 
-def retargeted_from(scene: bpy.types.Scene, rig: bpy.types.Object) -> bpy.types.Object | None:
+def retargeted_from(scene: Scene, rig: Object) -> Object | None:
     """Return the captured armature in the scene that a rig was retargeted from."""
     person = stored_person(rig)
     if person is None or not is_person(person):
@@ -76,19 +77,17 @@ def retargeted_from(scene: bpy.types.Scene, rig: bpy.types.Object) -> bpy.types.
     return person if holds(scene.collection, person) else None
 
 
-def captured_people(context: bpy.types.Context) -> list[bpy.types.Object]:
+def captured_people(context: Context) -> list[Object]:
     """Return the captured armatures of the scene."""
     return [obj for obj in context.scene.objects if obj.type == "ARMATURE" and is_person(obj)]
 
 
-def has_captured_person(context: bpy.types.Context) -> bool:
+def has_captured_person(context: Context) -> bool:
     """Return whether the scene contains a captured person, or one is active."""
     return captured_armature(context) is not None or bool(captured_people(context))
 
 
-def draw_active_person(
-    layout: bpy.types.UILayout, context: bpy.types.Context
-) -> bpy.types.Object | None:
+def draw_active_person(layout: UILayout, context: Context) -> Object | None:
     """Draw the name of the active captured armature, or a request to select one; return the
     armature.
     """
@@ -100,7 +99,7 @@ def draw_active_person(
     return armature
 
 
-def library_of(armature: bpy.types.Object) -> bpy.types.Library | None:
+def library_of(armature: Object) -> bpy.types.Library | None:
     """Return the library that the armature or its action is linked from, overridden or not; None if
     both are local.
     """
@@ -111,7 +110,7 @@ def library_of(armature: bpy.types.Object) -> bpy.types.Library | None:
     return None
 
 
-def body_of(armature: bpy.types.Object) -> Body:
+def body_of(armature: Object) -> Body:
     """Return the body that the person was captured with.
 
     :raises ModelFileError: the body's file no longer exists or cannot be read.
@@ -128,7 +127,7 @@ def body_of(armature: bpy.types.Object) -> Body:
     return load_body(which)
 
 
-def betas_of(armature: bpy.types.Object, body: Body) -> Float64Array:
+def betas_of(armature: Object, body: Body) -> Float64Array:
     """Return the person's shape coefficients, (P,).
 
     :raises UsageError: the armature does not store them.
@@ -141,7 +140,7 @@ def betas_of(armature: bpy.types.Object, body: Body) -> Float64Array:
     return betas
 
 
-def motion_of(armature: bpy.types.Object) -> Motion:
+def motion_of(armature: Object) -> Motion:
     """Return the captured motion, before any editing but with its corrections.
 
     :raises UsageError: the armature does not store it.
@@ -152,7 +151,7 @@ def motion_of(armature: bpy.types.Object) -> Motion:
     return stored_motion(armature)
 
 
-def motion_if_stored(armature: bpy.types.Object) -> Motion | None:
+def motion_if_stored(armature: Object) -> Motion | None:
     """Return the captured motion as `motion_of` does; None if it is lost or damaged."""
     try:
         return motion_of(armature)
@@ -160,7 +159,7 @@ def motion_if_stored(armature: bpy.types.Object) -> Motion | None:
         return None
 
 
-def set_motion_of(armature: bpy.types.Object, motion: Motion, keys: bytes = b"") -> None:
+def set_motion_of(armature: Object, motion: Motion, keys: bytes = b"") -> None:
     """Store a motion as the armature's captured one. Undo restores the former one, and its
     duplicates keep it.
 
@@ -173,10 +172,7 @@ def set_motion_of(armature: bpy.types.Object, motion: Motion, keys: bytes = b"")
 
 
 def edit_clip(
-    armature: bpy.types.Object,
-    body: Body,
-    rate: float,
-    change: Callable[[Clip, Float64Array], Clip],
+    armature: Object, body: Body, rate: float, change: Callable[[Clip, Float64Array], Clip]
 ) -> None:
     """Replace the keys of a captured armature on the same frames.
 
@@ -189,7 +185,7 @@ def edit_clip(
     write_clip(armature, body, change(clip, frames), frames)
 
 
-def may_edit(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+def may_edit(cls: type[Operator], context: Context) -> bool:
     """Return whether there is a captured armature whose keys are stored in this file; if not, say
     why.
     """
@@ -215,21 +211,19 @@ class EditOperator(ReportingOperator):
     """
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a captured armature whose keys are stored in this file."""
         return may_edit(cls, context)
 
     if TYPE_CHECKING:  # implemented by each operator
 
-        def edit(
-            self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-        ) -> str:
+        def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
             """Change the keys and return a message for the user, which may be empty.
 
             :param rate: for which the keys were written, frames per second.
             """
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Edit the keys; if that fails, restore them."""
         from ..scene.timing import keyed_rate
         from ..scene.transaction import all_or_nothing
@@ -244,7 +238,7 @@ class EditOperator(ReportingOperator):
                 message = self.edit(context, armature, body_of(armature), rate)
         return message
 
-    def people(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+    def people(self, context: Context) -> list[Object]:
         """Return the captured armatures to edit: the active one."""
         armature = captured_armature(context)
         assert armature is not None  # checked by poll
@@ -257,7 +251,7 @@ class SpanOperator(EditOperator):
     start: IntProperty(name="First Frame", description="First frame of the span")
     end: IntProperty(name="Last Frame", description="Last frame of the span, inclusive")
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Ask for the span; suggest the preview range, if there is one."""
         scene = context.scene
         if scene.use_preview_range:
@@ -267,7 +261,7 @@ class SpanOperator(EditOperator):
             self.start, self.end = self.default_span(scene)
         return context.window_manager.invoke_props_dialog(self)
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Edit the keys within the span.
 
         :raises UsageError: the span ends before it begins.
@@ -279,6 +273,6 @@ class SpanOperator(EditOperator):
             )
         return super().work(context)
 
-    def default_span(self, scene: bpy.types.Scene) -> tuple[int, int]:
+    def default_span(self, scene: Scene) -> tuple[int, int]:
         """Return the span to suggest without a preview range: around the current frame."""
         return scene.frame_current - 2, scene.frame_current + 2

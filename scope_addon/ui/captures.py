@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import StringProperty
+from bpy.types import Context, Object, Operator, PropertyGroup, Scene, UILayout, UIList
 
 from ..notices import notice
 from ..scene.datablocks import captures_of, is_in_layer, is_person, with_data
@@ -33,7 +34,7 @@ _PADDING = 10.0
 _WIDE = 340.0
 
 
-def shown_capture(scene: bpy.types.Scene) -> bpy.types.Collection | None:
+def shown_capture(scene: Scene) -> bpy.types.Collection | None:
     """Return the capture that is selected in the list; the last one if the selected one was
     removed.
     """
@@ -44,7 +45,7 @@ def shown_capture(scene: bpy.types.Scene) -> bpy.types.Collection | None:
 
 
 def hide_others(
-    scene: bpy.types.Scene, shown: Collection[bpy.types.Collection]
+    scene: Scene, shown: Collection[bpy.types.Collection]
 ) -> list[bpy.types.Collection]:
     """Hide all captures but the new ones, in whose place they are, in viewports and renders; return
     those that were shown.
@@ -86,12 +87,12 @@ def _evaluate_animation(capture: bpy.types.Collection) -> None:
                 block.update_tag(refresh={"TIME"})
 
 
-def people_of(capture: bpy.types.Collection) -> list[bpy.types.Object]:
+def people_of(capture: bpy.types.Collection) -> list[Object]:
     """Return the captured armatures of a capture; empty if they were deleted."""
     return [obj for obj in capture.all_objects if obj.type == "ARMATURE" and is_person(obj)]
 
 
-def unit_text(scene: bpy.types.Scene) -> str:
+def unit_text(scene: Scene) -> str:
     """Return what to say of a scene whose unit is not a metre; empty if the shown people have their
     size in it.
     """
@@ -110,7 +111,7 @@ def people_text(count: int) -> str:
     return iface_("{count} person" if count == 1 else "{count} people", count=count)
 
 
-def shown_index(settings: bpy.types.PropertyGroup) -> int:
+def shown_index(settings: PropertyGroup) -> int:
     """Return the shown capture's index among the file's collections; -1 if there is none. Blender's
     list asks for it.
 
@@ -121,13 +122,13 @@ def shown_index(settings: bpy.types.PropertyGroup) -> int:
     return next((index for index, each in enumerate(bpy.data.collections) if each == shown), -1)
 
 
-def show_index(settings: bpy.types.PropertyGroup, index: int) -> None:
+def show_index(settings: PropertyGroup, index: int) -> None:
     """Show the capture at an index among the file's collections."""
     if 0 <= index < len(bpy.data.collections):
         _show(settings, bpy.data.collections[index])
 
 
-def _show(settings: bpy.types.PropertyGroup, capture: bpy.types.Collection) -> None:
+def _show(settings: PropertyGroup, capture: bpy.types.Collection) -> None:
     settings.capture = capture
     show_again(capture)
     _make_active(capture)
@@ -178,7 +179,7 @@ def _text_width(text: str) -> float:
     return float(blf.dimensions(0, text)[0])
 
 
-class SCOPE_OT_show_capture(bpy.types.Operator):
+class SCOPE_OT_show_capture(Operator):
     """Show this capture"""
 
     bl_idname = "scope.show_capture"
@@ -188,9 +189,7 @@ class SCOPE_OT_show_capture(bpy.types.Operator):
     name: StringProperty(name="Name", description="Name of the capture's collection")
 
     @classmethod
-    def description(
-        cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties
-    ) -> str:
+    def description(cls, _context: Context, properties: bpy.types.OperatorProperties) -> str:
         """Return the whole name, which the list may have no room for, and where to change it.
 
         Blender opens the text field of an entry on a double click, and hands a button no second
@@ -198,7 +197,7 @@ class SCOPE_OT_show_capture(bpy.types.Operator):
         """
         return f"{properties.name}\n{tip_('Rename it with Object > Motion Capture > Rename Take')}"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Select it in the list."""
         capture = bpy.data.collections.get(self.name)
         if capture not in captures_of(context.scene):
@@ -207,17 +206,17 @@ class SCOPE_OT_show_capture(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_UL_captures(bpy.types.UIList):
+class SCOPE_UL_captures(UIList):
     """The captures of the scene."""
 
     def draw_item(
         self,
-        context: bpy.types.Context,
-        layout: bpy.types.UILayout,
+        context: Context,
+        layout: UILayout,
         _data: bpy.types.BlendData,
         item: bpy.types.Collection,
         _icon: int,
-        _settings: bpy.types.PropertyGroup,
+        _settings: PropertyGroup,
         _active_property: str,
     ) -> None:
         """Draw one capture: its name, its people, and whether it has warnings; grey without an
@@ -251,7 +250,7 @@ class SCOPE_UL_captures(bpy.types.UIList):
         details.label(text="", icon="ERROR" if people and len(result.warnings) else "BLANK1")
 
     def filter_items(
-        self, context: bpy.types.Context, data: bpy.types.BlendData, property_name: str
+        self, context: Context, data: bpy.types.BlendData, property_name: str
     ) -> tuple[list[int], list[int]]:
         """Show only the captures of the scene, and of these the ones whose name contains the typed
         filter.
@@ -265,7 +264,7 @@ class SCOPE_UL_captures(bpy.types.UIList):
         return flags, []
 
 
-def draw_captures(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+def draw_captures(layout: UILayout, context: Context) -> None:
     """Draw the list if the scene has several captures."""
     count = len(captures_of(context.scene))
     if count > 1:

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
+from bpy.types import Area, Collection, Context, Object, Region, Scene, SpaceView3D, Window
 from mathutils import Matrix, Quaternion, Vector
 
 from ...solver.errors import ScopeError
@@ -60,34 +61,32 @@ _looked_through: set[int] = set()  # areas that showed a capture through its cam
 _sides: set[int] = set()  # areas that showed a capture from its side
 
 
-def cameras_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+def cameras_of(scene: Scene) -> list[Object]:
     """Return the cameras of the scene's last capture, the one of its first video first."""
     collection = scene.scope.result.collection
     cameras = cameras_of_clip(collection) if collection else []
     return cameras if cameras and view_number(cameras[0]) is None else []
 
 
-def camera_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
+def camera_of(scene: Scene) -> Object | None:
     """Return the camera of the first video of the scene's last capture; None if there is none."""
     return next(iter(cameras_of(scene)), None)
 
 
-def is_looking_through(context: bpy.types.Context) -> bool:
+def is_looking_through(context: Context) -> bool:
     """Return whether the context's viewport shows only a capture, through its camera."""
     space = context.space_data
     return space is not None and space.type == "VIEW_3D" and looks_through(context.scene, space)
 
 
-def looks_through(scene: bpy.types.Scene, space: bpy.types.SpaceView3D) -> bool:
+def looks_through(scene: Scene, space: SpaceView3D) -> bool:
     """Return whether a viewport shows only a capture, through one of its cameras."""
     if not space.local_view or space.region_3d.view_perspective != "CAMERA":
         return False
     return scene.camera is not None and scene.camera in cameras_of(scene)
 
 
-def begin(
-    context: bpy.types.Context, area: bpy.types.Area, collection: bpy.types.Collection
-) -> None:
+def begin(context: Context, area: Area, collection: Collection) -> None:
     """Show a capture over its footage in a viewport, without bones, which would cover the body."""
     space = area.spaces.active
     _show_alone(context, area, collection)
@@ -102,13 +101,13 @@ def begin(
     fit_frame(context.scene, area)
 
 
-def look_from(scene: bpy.types.Scene, area: bpy.types.Area) -> None:
+def look_from(scene: Scene, area: Area) -> None:
     """Let a viewport that compares look through another camera, which is the scene's."""
     area.spaces.active.camera = scene.camera
     fit_frame(scene, area)
 
 
-def end(window: bpy.types.Window, area: bpy.types.Area) -> None:
+def end(window: Window, area: Area) -> None:
     """Show the scene in a viewport again as before the comparison."""
     space = area.spaces.active
     # unknown after the file was opened again
@@ -123,19 +122,19 @@ def end(window: bpy.types.Window, area: bpy.types.Area) -> None:
         space.camera = window.scene.camera  # leaving local view brings back the one from before it
 
 
-def end_others(scene: bpy.types.Scene, shown: bpy.types.Collection) -> None:
+def end_others(scene: Scene, shown: Collection) -> None:
     """End every comparison of a capture other than the shown one: its footage would be behind the
     wrong body.
     """
     _end_where(lambda space: _compares_another(scene, space, shown))
 
 
-def end_of(shown: bpy.types.Collection) -> None:
+def end_of(shown: Collection) -> None:
     """End every comparison of a capture."""
     _end_where(lambda space: bool(space.local_view and space.camera and holds(shown, space.camera)))
 
 
-def _end_where(compares: Callable[[bpy.types.SpaceView3D], bool]) -> None:
+def _end_where(compares: Callable[[SpaceView3D], bool]) -> None:
     """End the comparisons of some viewports, with the side views beside them."""
     for window, area in viewports():
         if compares(area.spaces.active):
@@ -144,7 +143,7 @@ def _end_where(compares: Callable[[bpy.types.SpaceView3D], bool]) -> None:
                 _close_later(side)
 
 
-def _close_later(side: bpy.types.Area) -> None:
+def _close_later(side: Area) -> None:
     """Close the side view when no operator runs: Blender crashes when a running one's context was
     closed.
     """
@@ -159,9 +158,7 @@ def _close_later(side: bpy.types.Area) -> None:
         bpy.app.timers.register(close, first_interval=_DRAWN_AFTER_S)
 
 
-def _compares_another(
-    scene: bpy.types.Scene, space: bpy.types.SpaceView3D, shown: bpy.types.Collection
-) -> bool:
+def _compares_another(scene: Scene, space: SpaceView3D, shown: Collection) -> bool:
     """Return whether a viewport looks through the camera of a capture of the scene that is not the
     shown one.
     """
@@ -172,7 +169,7 @@ def _compares_another(
     return has_capture and not holds(shown, camera)
 
 
-def side_area(screen: bpy.types.Screen) -> bpy.types.Area | None:
+def side_area(screen: bpy.types.Screen) -> Area | None:
     """Return the viewport with the side view; None if there is none."""
     return next(
         (area for area in screen.areas if area.type == "VIEW_3D" and _is_side(area.spaces.active)),
@@ -180,18 +177,18 @@ def side_area(screen: bpy.types.Screen) -> bpy.types.Area | None:
     )
 
 
-def is_side_view(context: bpy.types.Context) -> bool:
+def is_side_view(context: Context) -> bool:
     """Return whether the context's viewport is the side view."""
     space = context.space_data
     return space is not None and space.type == "VIEW_3D" and _is_side(space)
 
 
-def _is_side(space: bpy.types.SpaceView3D) -> bool:
+def _is_side(space: SpaceView3D) -> bool:
     followed = space.lock_object
     return bool(space.local_view and followed is not None and is_person(followed))
 
 
-def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
+def open_side_view(context: Context, area: Area) -> None:
     """Split a viewport, and show the capture from its side in the new one; if nobody of it is left,
     do nothing.
     """
@@ -240,7 +237,7 @@ def _span(shown: tuple[float, float], aspect: float) -> float:
     return max(shown[0] / aspect, shown[1]) * max(1.0, aspect)
 
 
-def close_side_view(window: bpy.types.Window, side: bpy.types.Area) -> None:
+def close_side_view(window: Window, side: Area) -> None:
     """Give the place of the side view back to the viewport that it was split from."""
     with _in(window, side):
         bpy.ops.screen.area_close()
@@ -249,7 +246,7 @@ def close_side_view(window: bpy.types.Window, side: bpy.types.Area) -> None:
             _fit_later(area)
 
 
-def _fit_later(area: bpy.types.Area) -> None:
+def _fit_later(area: Area) -> None:
     """Fit the camera's frame into a viewport whose size changes when it is drawn next."""
     pointer = area.as_pointer()
 
@@ -278,9 +275,7 @@ def _side_rotation(camera: Matrix) -> Matrix:
     return Matrix((up.cross(back), up, back)).transposed()
 
 
-def _show_alone(
-    context: bpy.types.Context, area: bpy.types.Area, collection: bpy.types.Collection
-) -> None:
+def _show_alone(context: Context, area: Area, collection: Collection) -> None:
     """Show only the capture in local view, because other objects could hide the footage or the
     body.
     """
@@ -302,12 +297,12 @@ def _show_alone(
         obj.select_set(True)
 
 
-def _in(window: bpy.types.Window, area: bpy.types.Area) -> bpy.types.ContextTempOverride:
+def _in(window: Window, area: Area) -> bpy.types.ContextTempOverride:
     """Return the context of a viewport's main region."""
     return bpy.context.temp_override(window=window, area=area, region=main_region(area))
 
 
-def fit_frame(scene: bpy.types.Scene, area: bpy.types.Area) -> None:
+def fit_frame(scene: Scene, area: Area) -> None:
     """Zoom and move a viewport's camera view so that the whole frame of the scene's camera is
     visible.
     """
@@ -331,7 +326,7 @@ def fit_frame(scene: bpy.types.Scene, area: bpy.types.Area) -> None:
     )
 
 
-def unfit_frame(space: bpy.types.SpaceView3D) -> None:
+def unfit_frame(space: SpaceView3D) -> None:
     """Restore the zoom and offset from before the first fit."""
     if (former := _former.pop(space.as_pointer(), None)) is not None:
         space.region_3d.view_camera_zoom, space.region_3d.view_camera_offset = former
@@ -349,9 +344,7 @@ def _frame_at_one(
     return size[0] * scale, size[1] * scale
 
 
-def visible_part(
-    area: bpy.types.Area, region: bpy.types.Region
-) -> tuple[float, float, float, float]:
+def visible_part(area: Area, region: Region) -> tuple[float, float, float, float]:
     """Return the left, right, bottom and top of what no other region covers, in pixels of the
     viewport's region.
     """
@@ -381,9 +374,7 @@ def visible_part(
 
 
 def side_extent(
-    followed: bpy.types.Object,
-    people: Sequence[bpy.types.Object],
-    R_world_view: Float64Array,
+    followed: Object, people: Sequence[Object], R_world_view: Float64Array
 ) -> tuple[float, float]:
     """Return the width and height that a view along -z must show around the pelvis of ``followed``,
     in units of the scene, in which people may be scaled.
@@ -408,7 +399,7 @@ def side_extent(
     return width, 2.0 * (float(far[1]) + size * _HALF_HEIGHT_M)
 
 
-def _pelvis_path(armature: bpy.types.Object, rate: float) -> Float64Array | None:
+def _pelvis_path(armature: Object, rate: float) -> Float64Array | None:
     """Return the scene frame and the world position of the pelvis at every key, (T, 4); None
     without keys.
     """

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import bpy
 from bpy.props import (
     BoolProperty,
     EnumProperty,
@@ -16,6 +15,7 @@ from bpy.props import (
     IntProperty,
     StringProperty,
 )
+from bpy.types import Context, Object, Scene
 
 from ..errors import UsageError
 from ..scene.character.correction_list import listed_corrections, store_corrections
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 class CorrectionOperator(EditOperator):
     """A correction after which Blender evaluates the current frame again. Not registered."""
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Correct the motion and its keys."""
         message = super().work(context)
         context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
@@ -52,7 +52,7 @@ class CorrectionOperator(EditOperator):
 
 
 def change_corrections(
-    armature: bpy.types.Object,
+    armature: Object,
     body: Body,
     rate: float,
     before: Motion,
@@ -91,7 +91,7 @@ def change_corrections(
 
 
 def add_correction(
-    armature: bpy.types.Object, body: Body, rate: float, before: Motion, new: Correction
+    armature: Object, body: Body, rate: float, before: Motion, new: Correction
 ) -> Motion:
     """Add a correction; parameters and result are those of `change_corrections`."""
     from ..edit.corrections import added
@@ -102,8 +102,8 @@ def add_correction(
 
 
 def change_world(
-    scene: bpy.types.Scene,
-    armature: bpy.types.Object,
+    scene: Scene,
+    armature: Object,
     motion: Motion,
     change: Callable[[tuple[Correction, ...]], tuple[Correction, ...]],
     rise: float = 0.0,
@@ -156,7 +156,7 @@ def change_world(
     return after
 
 
-def _is_in_footage(person: bpy.types.Object, motion: Motion) -> bool:
+def _is_in_footage(person: Object, motion: Motion) -> bool:
     """Return whether a person was captured in the same footage as a motion, and is in its world."""
     from ..scene.camera import same_camera
 
@@ -177,7 +177,7 @@ def without_kinds(corrections: tuple[Correction, ...], kinds: set[str]) -> tuple
     )
 
 
-def shown_frame(scene: bpy.types.Scene, armature: bpy.types.Object, motion: Motion) -> int:
+def shown_frame(scene: Scene, armature: Object, motion: Motion) -> int:
     """Return the footage's frame at the scene's current frame.
 
     :raises UsageError: the motion has none there.
@@ -196,7 +196,7 @@ _NOW = -LAST_FRAME  # the first frame that Blender allows; stands for the curren
 last_pin_warnings: list[str] = []
 
 
-def floor_warning(armature: bpy.types.Object, motion: Motion, body: Body) -> str:
+def floor_warning(armature: Object, motion: Motion, body: Body) -> str:
     """Return the message about feet that corrections have put under the floor; empty if there are
     none.
     """
@@ -226,7 +226,7 @@ def floor_warning(armature: bpy.types.Object, motion: Motion, body: Body) -> str
     )
 
 
-def _unreached(armature: bpy.types.Object, joint: str, frame: int) -> str:
+def _unreached(armature: Object, joint: str, frame: int) -> str:
     """Return the message about a joint that cannot reach its pin in a scene frame; empty if it
     does.
     """
@@ -280,9 +280,7 @@ class SCOPE_OT_add_pin(EditOperator):
         description="Seconds before and after the frame over which the correction fades out",
     )
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
+    def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
         """Add the pin and change the keys around it."""
         from ..scene.timing import current_frame_kept
 
@@ -300,7 +298,7 @@ class SCOPE_OT_add_pin(EditOperator):
             self.report({"WARNING"}, warning)
         return ""
 
-    def _pin(self, context: bpy.types.Context, armature: bpy.types.Object, motion: Motion) -> Pin:
+    def _pin(self, context: Context, armature: Object, motion: Motion) -> Pin:
         """Return the pin at the scene's current frame. One in the image needs the capture's camera
         where it was captured.
 
@@ -338,14 +336,12 @@ class CorrectSpanOperator(CorrectionOperator, SpanOperator):
         def correction(self, first: int, last: int) -> Correction:
             """Return the correction of these frames of the footage."""
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
+    def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
         """Add the correction and change the keys."""
         self.correct(armature, body, rate, motion_of(armature))
         return ""
 
-    def correct(self, armature: bpy.types.Object, body: Body, rate: float, motion: Motion) -> None:
+    def correct(self, armature: Object, body: Body, rate: float, motion: Motion) -> None:
         """Do what `edit` does, with the person's motion."""
         from ..scene.character.corrected_keys import source_frame, whole_span
 
@@ -358,7 +354,7 @@ class CorrectSpanOperator(CorrectionOperator, SpanOperator):
         for warning in filter(None, self.warnings(armature, motion, body)):
             self.report({"WARNING"}, warning)
 
-    def warnings(self, armature: bpy.types.Object, motion: Motion, body: Body) -> list[str]:
+    def warnings(self, armature: Object, motion: Motion, body: Body) -> list[str]:
         """Return what to warn of in a corrected motion; empty texts are left out."""
         return [floor_warning(armature, motion, body)]
 
@@ -411,7 +407,7 @@ class SCOPE_OT_this_rests(CorrectSpanOperator):
 
         return Contact(first, last, self.part)
 
-    def warnings(self, armature: bpy.types.Object, motion: Motion, body: Body) -> list[str]:
+    def warnings(self, armature: Object, motion: Motion, body: Body) -> list[str]:
         """Say also where the body cannot reach the floor."""
         return [*super().warnings(armature, motion, body), self._off_floor(motion, body)]
 
@@ -519,7 +515,7 @@ class SCOPE_OT_remove_correction(CorrectionOperator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a captured armature with corrections."""
         if not super().poll(context):
             return False
@@ -528,9 +524,7 @@ class SCOPE_OT_remove_correction(CorrectionOperator):
             return refuse(cls, "The selected person has no corrections")
         return True
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
+    def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
         """Remove it and change the keys back.
 
         :raises UsageError: there is no correction of this number, or sides were exchanged by it in

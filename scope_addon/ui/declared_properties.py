@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.types import PropertyGroup, UILayout
 
 from ..options import Choice, Option, Place, Section, options_at
 from .file_field import path_text, text_name
@@ -89,16 +90,14 @@ def limits_of(option: Option) -> tuple[float | None, float | None]:
     return low, high
 
 
-def split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
+def split(layout: UILayout) -> UILayout:
     """Set the layout to labels on the left and values on the right, and return it."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     return layout
 
 
-def draw_section(
-    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, section: Section
-) -> None:
+def draw_section(layout: UILayout, settings: PropertyGroup, section: Section) -> None:
     """Draw the properties of a section of the panel."""
     for option in options_at(Place.PANEL):
         if option.blender.section is section:

@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
+from bpy.types import Context, Object, Panel, Scene, UILayout
 
 from ...solver.errors import ScopeError
 from ..scene.character.correction_list import listed_corrections
@@ -52,13 +52,13 @@ if TYPE_CHECKING:
     from ..motion import Motion
 
 
-class SCOPE_PT_edit(PersonTab, bpy.types.Panel):
+class SCOPE_PT_edit(PersonTab, Panel):
     """Smoothing, repairs, floor, root motion, loops and keys of the selected person."""
 
     bl_idname = "SCOPE_PT_edit"
     bl_label = "Refine"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the panel."""
         layout = self.layout
         if draw_active_person(layout, context) is None:
@@ -114,7 +114,7 @@ class SCOPE_OT_smooth(EditOperator):
         description="Smooth everybody of the capture, and not only the selected person",
     )
 
-    def people(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+    def people(self, context: Context) -> list[Object]:
         """Return the active captured armature, or all local ones of its capture."""
         (active,) = super().people(context)
         capture = next((c for c in captures_of(context.scene) if holds(c, active)), None)
@@ -122,7 +122,7 @@ class SCOPE_OT_smooth(EditOperator):
             return [active]
         return [person for person in people_of(capture) if library_of(person) is None]
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Smooth everybody, and only then remove what a failure could not bring back."""
         from ..scene.character.root_object import remove_root_object
 
@@ -132,9 +132,7 @@ class SCOPE_OT_smooth(EditOperator):
             remove_root_object(armature)
         return message
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
+    def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
         """Replace the keys by those of the captured motion, smoothed."""
         from ..edit.corrected_motion import uncorrected
         from ..edit.smooth import smoothed
@@ -194,9 +192,7 @@ class SCOPE_OT_root_motion(EditOperator):
         description="Include the rotation about the vertical axis in the root motion",
     )
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
+    def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
         """Change all keys."""
         from ..scene.character.root_object import (
             move_root_motion_to_bones,
@@ -249,13 +245,11 @@ class SCOPE_OT_loop(SpanOperator):
         description="Repeat the curves; each cycle starts where the previous one ended",
     )
 
-    def default_span(self, scene: bpy.types.Scene) -> tuple[int, int]:
+    def default_span(self, scene: Scene) -> tuple[int, int]:
         """Return the span to suggest without a preview range: the scene's frame range."""
         return scene.frame_start, scene.frame_end
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
+    def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
         """Replace the keys by those of the closed cycle."""
         from ..edit.loop import MIN_TURN, best_cycle, close_cycle
         from ..scene.actions import add_cycles, animated_together
@@ -328,9 +322,7 @@ class SCOPE_OT_reduce_keys(EditOperator):
         description="Maximum position error of the pelvis in millimetres",
     )
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
+    def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
         """Remove keys bone by bone."""
         from ..scene.character.keys import reduce_keys
 
@@ -366,9 +358,7 @@ class SCOPE_OT_bake_rate(EditOperator):
         description="Frame rate of the keys; 0: one key on each frame of the scene",
     )
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
+    def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
         """Replace all keys; at the scene's frame rate, they are on whole frames."""
         from ..edit.clip import resample
         from ..scene.character.keys import bake_whole_frames, read_clip, write_clip
@@ -402,9 +392,7 @@ class SCOPE_OT_interpolate_span(CorrectSpanOperator):
 
         return Interpolation(first, last)
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
+    def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
         """Edit the keys, and keep that with the motion."""
         from ..edit.spans import interpolate
 
@@ -437,7 +425,7 @@ class SCOPE_OT_refloor(CorrectionOperator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a motion with one floor: on stairs, everything below their middle would be raised
         to it.
         """
@@ -452,9 +440,7 @@ class SCOPE_OT_refloor(CorrectionOperator):
             )
         return True
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
+    def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
         """Edit all keys, and keep that with the motion."""
         from ..edit.corrections import FeetOnFloor
         from ..scene.character.corrected_keys import floored
@@ -476,7 +462,7 @@ class SCOPE_OT_refloor(CorrectionOperator):
         return ""
 
 
-def _correctable_motion(armature: bpy.types.Object) -> Motion | None:
+def _correctable_motion(armature: Object) -> Motion | None:
     """Return the captured motion; None if it, or a correction of it, is lost or damaged."""
     from ..edit.corrected_motion import corrections_of
 
@@ -500,7 +486,7 @@ _ICONS = {
 }
 
 
-class SCOPE_PT_corrections(PersonTab, bpy.types.Panel):
+class SCOPE_PT_corrections(PersonTab, Panel):
     """Pins, feet that stand, exchanged sides, kept edits, the upright line and the floor of the
     selected person.
     """
@@ -509,7 +495,7 @@ class SCOPE_PT_corrections(PersonTab, bpy.types.Panel):
     bl_label = "Corrections"
     bl_parent_id = "SCOPE_PT_edit"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the panel."""
         layout = self.layout
         armature = captured_armature(context)
@@ -539,7 +525,7 @@ class SCOPE_PT_corrections(PersonTab, bpy.types.Panel):
             column.operator("scope.remove_correction", text="Remove All").index = -1
 
 
-def draw_corrections(layout: bpy.types.UILayout, feet: bpy.types.UILayout) -> None:
+def draw_corrections(layout: UILayout, feet: UILayout) -> None:
     """Draw the buttons that add corrections, in the panel or a menu.
 
     :param feet: where both feet's buttons are.

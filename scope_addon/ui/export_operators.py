@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.types import Collection, Context, Event, Object, Scene
 
 from ..errors import UsageError
 from ..options import Place
@@ -145,21 +146,19 @@ class SCOPE_OT_export(SavingOperator):
     )
 
     @classmethod
-    def description(
-        cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties
-    ) -> str:
+    def description(cls, context: Context, properties: bpy.types.OperatorProperties) -> str:
         """Return the tooltip of the button for the format, and why the format is not available."""
         text = next(text for key, _, text, _ in FORMATS if key == properties.format)
         return tip_(text) if is_available(properties.format) else f"{tip_(text)}. {tip_(_NO_USD)}"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a capture in the scene."""
         if not captures_of(context.scene):
             return refuse(cls, "The scene contains no capture yet")
         return True
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Ask for the file."""
         self.filepath = str(_beside_nobody(_proposed(context, self.suffix())))
         self.filter_glob = f"*{self.suffix()}"
@@ -170,7 +169,7 @@ class SCOPE_OT_export(SavingOperator):
         """Return that of the format."""
         return _SUFFIX[self.format]
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the options in the sidebar of the file browser."""
         layout = split(self.layout)
         layout.prop(self, "which")
@@ -184,7 +183,7 @@ class SCOPE_OT_export(SavingOperator):
                 layout.prop(self, "camera")
                 layout.prop(self, "separate")
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Write the files.
 
         :raises UsageError: the file has no name or folder, or there is nothing of what is to be
@@ -220,7 +219,7 @@ class SCOPE_OT_export(SavingOperator):
             warn=warnings.append,
         )
 
-    def _captures(self, context: bpy.types.Context) -> list[bpy.types.Collection]:
+    def _captures(self, context: Context) -> list[Collection]:
         """Return the captures that are to be written.
 
         :raises UsageError: the active object belongs to none.
@@ -237,7 +236,7 @@ class SCOPE_OT_export(SavingOperator):
                 )
         return collections
 
-    def _write_rig(self, scene: bpy.types.Scene, path: Path, options: ExportOptions) -> list[Path]:
+    def _write_rig(self, scene: Scene, path: Path, options: ExportOptions) -> list[Path]:
         """Write the chosen rig; return the files.
 
         :raises UsageError: no rig is chosen, or the format has none.
@@ -259,10 +258,7 @@ class SCOPE_OT_export(SavingOperator):
 
 
 def write_captures(
-    path: Path,
-    kind: str,
-    captures: list[bpy.types.Collection],
-    options: ExportOptions | None = None,
+    path: Path, kind: str, captures: list[Collection], options: ExportOptions | None = None
 ) -> list[Path]:
     """Write captures in a format, a key of ``FORMATS``; return the files.
 
@@ -279,7 +275,7 @@ def write_captures(
 
 
 def write_at_own_rate(
-    path: Path, kind: str, capture: bpy.types.Collection, options: BuildOptions
+    path: Path, kind: str, capture: Collection, options: BuildOptions
 ) -> list[Path]:
     """Write a capture that nobody has edited as if it were built in a scene of the motion's frame
     rate; return the files.
@@ -303,7 +299,7 @@ def write_at_own_rate(
 
 
 @contextmanager
-def unused_path(folder: Path, capture: bpy.types.Collection, kind: str) -> Iterator[Path]:
+def unused_path(folder: Path, capture: Collection, kind: str) -> Iterator[Path]:
     """Give a path for a capture's file, with the capture's name, and a number where files of that
     name exist, or another Blender is going to write them.
 
@@ -351,7 +347,7 @@ def _is_taken(path: Path) -> bool:
     return any(map(os.path.lexists, names)) or bool(files_of_people(path))
 
 
-def _write_motions(path: Path, collections: list[bpy.types.Collection]) -> list[Path]:
+def _write_motions(path: Path, collections: list[Collection]) -> list[Path]:
     """Write the captured motions themselves; return the files.
 
     :raises UsageError: nobody is left of the captures.
@@ -379,7 +375,7 @@ class SCOPE_OT_save_calibration(SavingOperator):
     filter_glob: StringProperty(default="*.toml", options={"HIDDEN", "SKIP_SAVE"})
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a capture with several cameras."""
         return len(cameras_of(context.scene)) > 1
 
@@ -387,13 +383,13 @@ class SCOPE_OT_save_calibration(SavingOperator):
         """Return that of a calibration."""
         return ".toml"
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Ask for the file."""
         self.filepath = str(_proposed(context, self.suffix()))
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Write the file.
 
         :raises UsageError: the file has no name or folder, or the captured person was deleted.
@@ -408,7 +404,7 @@ class SCOPE_OT_save_calibration(SavingOperator):
         return rpt_("Wrote {files} in {folder}", files=path.name, folder=path.parent)
 
 
-def _proposed(context: bpy.types.Context, suffix: str) -> Path:
+def _proposed(context: Context, suffix: str) -> Path:
     """Return the file that is proposed for the shown capture."""
     shown = shown_capture(context.scene)
     name = _file_name(shown) if shown else "capture"
@@ -416,7 +412,7 @@ def _proposed(context: bpy.types.Context, suffix: str) -> Path:
     return folder / f"{name}{suffix}"
 
 
-def _file_name(capture: bpy.types.Collection) -> str:
+def _file_name(capture: Collection) -> str:
     """Return a capture's name without what a file's name cannot hold."""
     return re.sub(r'[\\/:*?"<>|]', "_", capture.name)
 
@@ -435,7 +431,7 @@ def _check_available(kind: str) -> None:
         raise UsageError(_NO_USD[0].lower() + _NO_USD[1:])
 
 
-def _take_of(rig: bpy.types.Object, collections: list[bpy.types.Collection]) -> str:
+def _take_of(rig: Object, collections: list[Collection]) -> str:
     """Return the name of the capture whose motion a rig has; empty if it is unknown."""
     person = stored_person(rig)
     return next((c.name for c in collections if person and holds(c, person)), "")

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, StringProperty
+from bpy.types import Context, Event, Operator, PropertyGroup, UILayout
 
 from ..errors import UsageError
 from ..footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, display_text
@@ -45,7 +46,7 @@ class FootageBrowser:
     filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
-    def ask(self, context: bpy.types.Context) -> set[str]:
+    def ask(self, context: Context) -> set[str]:
         """Open the browser, in the folder of the present footage."""
         self.filepath = present(context.scene.scope.footage)
         context.window_manager.fileselect_add(self)
@@ -62,10 +63,10 @@ class SeveralFootageBrowser(FootageBrowser):
 
     if TYPE_CHECKING:  # implemented by each operator
 
-        def execute(self, context: bpy.types.Context) -> set[str]:
+        def execute(self, context: Context) -> set[str]:
             """Use the chosen files."""
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Use a dropped file, or ask for some."""
         return self.execute(context) if self.filepath else self.ask(context)
 
@@ -84,7 +85,7 @@ class SavingOperator(ReportingOperator):
         def suffix(self) -> str:
             """Return the suffix of the file, with its dot."""
 
-    def check(self, context: bpy.types.Context) -> bool:
+    def check(self, context: Context) -> bool:
         """Add the suffix while the name is typed, so that the file browser sees which file would be
         overwritten.
         """
@@ -130,7 +131,7 @@ def present(path: str) -> str:
     return str(file) if path and os.path.isfile(file) and _ASSETS not in file.parents else ""
 
 
-def stored_path(context: bpy.types.Context, path: str) -> str:
+def stored_path(context: Context, path: str) -> str:
     """Return how a setting of the scene stores a chosen file: relative to the .blend file if the
     user prefers that.
 
@@ -155,10 +156,10 @@ def path_text(
     :param keywords: of the property.
     """
 
-    def get(settings: bpy.types.PropertyGroup) -> str:
+    def get(settings: PropertyGroup) -> str:
         return display_text(getattr(settings, path))
 
-    def put(settings: bpy.types.PropertyGroup, text: str) -> None:
+    def put(settings: PropertyGroup, text: str) -> None:
         # nothing was typed: of a name that is not UTF-8, the text is not the name
         if text == get(settings):
             return
@@ -174,9 +175,7 @@ def text_name(path: str) -> str:
     return path + _TEXT
 
 
-def draw_file(
-    layout: bpy.types.UILayout, settings: Any, path: str, **keywords: Any
-) -> bpy.types.UILayout:
+def draw_file(layout: UILayout, settings: Any, path: str, **keywords: Any) -> UILayout:
     """Draw the field of a path and the button that chooses a file; return their row.
 
     :param path: name of the path property in ``settings``, which has a ``path_text`` of it.
@@ -194,7 +193,7 @@ def draw_file(
     return row
 
 
-class SCOPE_OT_choose_file(bpy.types.Operator):
+class SCOPE_OT_choose_file(Operator):
     """Choose the file in the file browser"""
 
     bl_idname = "scope.choose_file"
@@ -209,7 +208,7 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
     owner: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
     setting: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Ask for the file, in the folder of the present one."""
         settings = self._settings(context)
         if settings is None:
@@ -220,7 +219,7 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Set the setting to the file."""
         settings = self._settings(context)
         if settings is None:
@@ -232,7 +231,7 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
             setattr(settings, self.setting, stored_path(context, self.filepath))
         return {"FINISHED"}
 
-    def _settings(self, context: bpy.types.Context) -> Any:
+    def _settings(self, context: Context) -> Any:
         """Return what has the setting; None if nothing has."""
         addon = context.preferences.addons.get(__package__.rpartition(".scope_addon")[0])
         of_addon = addon.preferences if addon else None
@@ -246,7 +245,7 @@ class _ViewportFileHandler(bpy.types.FileHandler):
     """Takes files that are dropped into a 3D viewport. Not registered."""
 
     @classmethod
-    def poll_drop(cls, context: bpy.types.Context) -> bool:
+    def poll_drop(cls, context: Context) -> bool:
         """Accept files over a 3D viewport, where the panel is."""
         return bool(context.area) and context.area.type == "VIEW_3D"
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import bpy
+from bpy.types import ID, Context, Object, Scene
 
 from ..notices import Notice, notice
 from ..scene.datablocks import holds
@@ -48,13 +49,13 @@ def rate_warnings(scene_rate: float, rate: float, what: str = "footage") -> list
     return [notice("scene_rate", scene_rate=scene_rate, what=what, rate=rate)]
 
 
-def differs(scene: bpy.types.Scene) -> bool:
+def differs(scene: Scene) -> bool:
     """Return whether the shown capture's footage has another frame rate than the scene"""
     rate = scene.scope.result.footage_rate
     return bool(rate > 0 and abs(rate - scene.render.fps / scene.render.fps_base) > _SAME)
 
 
-def keyed_for(scene: bpy.types.Scene) -> float:
+def keyed_for(scene: Scene) -> float:
     """Return the frame rate that the shown capture was keyed for, if the scene has another one
     since; otherwise 0.
 
@@ -78,7 +79,7 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
     bl_label = "Match Frame Rate"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a capture with a frame rate, and that everything to move is stored in this
         file.
         """
@@ -95,7 +96,7 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
                 )
         return True
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Change the rate and move the captures in time."""
         from ..scene.character.keys import bake_whole_frames, read_clip
         from ..scene.character.root_object import root_object
@@ -139,8 +140,8 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         return rpt_("The scene has {rate:.5g} frames/s, like the motion", rate=rate)
 
 
-def _library(block: bpy.types.ID) -> bpy.types.Library | None:
-    return library_of(block) if isinstance(block, bpy.types.Object) else block.library
+def _library(block: ID) -> bpy.types.Library | None:
+    return library_of(block) if isinstance(block, Object) else block.library
 
 
 def _exact(rate: float) -> float:
@@ -152,10 +153,7 @@ def _exact(rate: float) -> float:
 
 
 def _update_results(
-    scene: bpy.types.Scene,
-    rate: float,
-    keyed: dict[bpy.types.Object, float],
-    warnings: list[Notice],
+    scene: Scene, rate: float, keyed: dict[Object, float], warnings: list[Notice]
 ) -> None:
     """Move the frames that results name, and replace the warnings about the frame rate"""
     from ..scene.match_rate import retimed

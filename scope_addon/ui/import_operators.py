@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, StringProperty
+from bpy.types import Context, Event, Scene
 
 from ..capture_report import Report
 from ..errors import UsageError
@@ -57,14 +58,14 @@ class SCOPE_OT_import_motion(ReportingOperator):
         "frames",
     )
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Use dropped files, or ask for some."""
         if self.filepath or self.directory:
             return self.execute(context)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Read all files, then build them.
 
         :raises UsageError: no file was chosen.
@@ -102,7 +103,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
             raise UsageError("no motion file is chosen; choose an .npz file")
         return paths
 
-    def _body(self, context: bpy.types.Context) -> str:
+    def _body(self, context: Context) -> str:
         """Return the name or file of the body.
 
         :raises UsageError: no file is chosen for the body.
@@ -116,7 +117,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
             )
         return path
 
-    def _build_options(self, scene: bpy.types.Scene) -> BuildOptions:
+    def _build_options(self, scene: Scene) -> BuildOptions:
         """Return the scene's options, but change the frame rate only on request."""
         from .capture_job import build_options
 
@@ -125,7 +126,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
         return replace(options, frame_rate="set" if self.set_rate else rate)
 
 
-def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: BuildOptions) -> None:
+def _build(scene: Scene, path: Path, imported: Imported, options: BuildOptions) -> None:
     """Build one motion and store it and its result with the scene"""
     from ..scene.build import build_scene
     from ..scene.packed_motion import pack_motion

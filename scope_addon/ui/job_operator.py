@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 import bpy.utils.previews
+from bpy.types import Context, Event, Operator, Scene
 
 from .reporting import sentence
 from .viewports import is_over_tab, redraw_sidebars_twice
@@ -22,7 +23,7 @@ class JobState:
     scene_uid = 0  # of the scene that the job or the message belongs to
     message = ""  # why the last job failed
 
-    def message_in(self, scene: bpy.types.Scene) -> str:
+    def message_in(self, scene: Scene) -> str:
         """Return the message if it belongs to a scene, and otherwise an empty text."""
         return self.message if self.scene_uid == scene.session_uid else ""
 
@@ -33,7 +34,7 @@ class JobState:
         self.job = None
 
 
-class JobOperator(bpy.types.Operator):
+class JobOperator(Operator):
     """An operator that starts a job, and continues on a timer while Blender stays usable. Not
     registered.
     """
@@ -43,10 +44,10 @@ class JobOperator(bpy.types.Operator):
 
     if TYPE_CHECKING:  # implemented by each operator
 
-        def start(self, context: bpy.types.Context) -> bool:
+        def start(self, context: Context) -> bool:
             """Start the job; return whether that worked."""
 
-        def step(self, context: bpy.types.Context) -> set[str] | None:
+        def step(self, context: Context) -> set[str] | None:
             """Advance the job, and show its state; return None while it runs, and then the
             operator's outcome.
             """
@@ -57,7 +58,7 @@ class JobOperator(bpy.types.Operator):
         def say_cancelled(self) -> None:
             """Report that the job was cancelled."""
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Start from the panel, and continue on a timer."""
         if bpy.app.background:
             return self.execute(context)
@@ -69,7 +70,7 @@ class JobOperator(bpy.types.Operator):
         redraw_sidebars_twice()
         return {"RUNNING_MODAL"}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         """Step on timer events, cancel on Escape over the panel, pass the others to Blender.
 
         Elsewhere, Escape belongs to what is under the mouse, such as the playback of the timeline.
@@ -92,7 +93,7 @@ class JobOperator(bpy.types.Operator):
             raise
         return self.end(context, outcome) if outcome else {"PASS_THROUGH"}
 
-    def cancel(self, context: bpy.types.Context) -> None:
+    def cancel(self, context: Context) -> None:
         """Stop when Blender opens another file or quits."""
         self.end(context, {"CANCELLED"})
 
@@ -104,7 +105,7 @@ class JobOperator(bpy.types.Operator):
         self.report({"ERROR"}, self.job_state.message)
         return False
 
-    def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+    def end(self, context: Context, outcome: set[str]) -> set[str]:
         """Stop the job and the timer, and return the outcome."""
         self.job_state.stop()
         if (timer := getattr(self, "_timer", None)) is not None:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+from bpy.types import Object, Scene
 
 from ...solver.body import Body
 from ...solver.errors import ScopeError
@@ -71,7 +72,7 @@ class LiveStatus:
 class LiveJob:
     """A live capture for one scene, with the current settings of the scene."""
 
-    def __init__(self, scene: bpy.types.Scene, unfinished: Path | None = None) -> None:
+    def __init__(self, scene: Scene, unfinished: Path | None = None) -> None:
         """Start the process.
 
         :param unfinished: file of a recording that is to be finished; None: capture.
@@ -249,7 +250,7 @@ class LiveJob:
                 self._result = message
                 self._result_s = time.monotonic()
 
-    def _show(self, scene: bpy.types.Scene, poses: Sequence[ShownPose]) -> None:
+    def _show(self, scene: Scene, poses: Sequence[ShownPose]) -> None:
         """Show the newest pose of each person."""
         self.poses += 1
         self._last_pose_s = time.monotonic()
@@ -264,7 +265,7 @@ class LiveJob:
             if pose.person < len(self._bodies):
                 self._show_person(scene, pose)
 
-    def _show_person(self, scene: bpy.types.Scene, pose: ShownPose) -> None:
+    def _show_person(self, scene: Scene, pose: ShownPose) -> None:
         body = self._bodies[pose.person]
         is_busy = body.armature is None and Selection(scene).shows_work(since=self._selection)
         with selection_kept(scene) if is_busy else nullcontext():
@@ -292,7 +293,7 @@ class LiveJob:
         for body in self._bodies:
             body.remove()
 
-    def _leave_pose(self, scene: bpy.types.Scene) -> None:
+    def _leave_pose(self, scene: Scene) -> None:
         """Leave the last pose, on an armature at rest in the shape that was estimated last."""
         self._show_captures()
         with window_shows(scene):
@@ -306,7 +307,7 @@ class LiveJob:
             ):
                 hide(armature, bpy.context.view_layer)
 
-    def _build(self, scene: bpy.types.Scene, result: dict[str, Any]) -> None:
+    def _build(self, scene: Scene, result: dict[str, Any]) -> None:
         """Write the recording's keys, as a capture of footage does, and remove the body that
         followed.
         """
@@ -336,9 +337,7 @@ class LiveJob:
         if self._unfinished is not None:
             remove_recording(self._unfinished)
 
-    def _retargeted(
-        self, scene: bpy.types.Scene, armature: bpy.types.Object, name: str
-    ) -> list[Notice]:
+    def _retargeted(self, scene: Scene, armature: Object, name: str) -> list[Notice]:
         """Put the first person's recording on the rig that followed them; return what to say.
 
         :param armature: of the first person who was recorded;  name: of that person's file.
@@ -363,7 +362,7 @@ def finishing_request(unfinished: Path) -> LiveRequest:
     return LiveRequest(str(unfinished), body=read_about(unfinished).body)
 
 
-def live_rig(scene: bpy.types.Scene, body: Body) -> LiveRig:
+def live_rig(scene: Scene, body: Body) -> LiveRig:
     """Prepare the rig of the Retarget section.
 
     :raises ScopeError: there is none, or it cannot be used.
@@ -381,7 +380,7 @@ def live_rig(scene: bpy.types.Scene, body: Body) -> LiveRig:
     return LiveRig(settings.rig, body, bones, retarget_options(settings))
 
 
-def kept_footage(scene: bpy.types.Scene) -> Path:
+def kept_footage(scene: Scene) -> Path:
     """Return a new name beside the .blend file for the pictures of a recording.
 
     :raises UsageError: the .blend file was never saved.
@@ -396,7 +395,7 @@ def kept_footage(scene: bpy.types.Scene) -> Path:
     return folder / f"{stem} {time.strftime('%Y-%m-%d %H.%M.%S')}.mp4"
 
 
-def live_request(scene: bpy.types.Scene) -> LiveRequest:
+def live_request(scene: Scene) -> LiveRequest:
     """Make the request to the worker from the scene's settings and the preferences.
 
     :raises UsageError: no source or body file is chosen, or the source is a stream, and Blender is

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import bpy
+from bpy.types import Context, Operator, Panel, UILayout
 
 from ...solver.errors import ScopeError
 from ..errors import UsageError
@@ -52,18 +53,18 @@ class _LiveOperator(JobOperator):
     _played = False  # whether the scene's animation was started
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require that nothing is running."""
         return nothing_runs(cls)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Refuse to run without a window, whose timer applies the poses."""
         self.report(
             {"ERROR"}, "Live capture needs Blender's window; in a shell, use ./scripts/live"
         )
         return {"CANCELLED"}
 
-    def start(self, context: bpy.types.Context) -> bool:
+    def start(self, context: Context) -> bool:
         """Start the job; return whether that worked."""
         state.message = ""
         state.scene_uid = context.scene.session_uid
@@ -87,7 +88,7 @@ class _LiveOperator(JobOperator):
         """Return the file of a recording that is to be finished; None: capture."""
         return None
 
-    def step(self, context: bpy.types.Context) -> set[str] | None:
+    def step(self, context: Context) -> set[str] | None:
         """Advance the job; return None while it is running, and then the operator's outcome."""
         job = state.job
         assert job is not None
@@ -130,7 +131,7 @@ class _LiveOperator(JobOperator):
         """Say that nothing has changed."""
         self.report({"INFO"}, "Live capture cancelled; the scene is unchanged")
 
-    def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+    def end(self, context: Context, outcome: set[str]) -> set[str]:
         """Stop the job, the timer and the scene's animation, and return the outcome."""
         if self._played:
             stop_scene(context)
@@ -151,7 +152,7 @@ class SCOPE_OT_finish_recording(_LiveOperator):
     bl_label = "Finish Recording"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require that nothing is running, and that there is a recording."""
         return super().poll(context) and bool(cache().unfinished_recordings())
 
@@ -160,11 +161,11 @@ class SCOPE_OT_finish_recording(_LiveOperator):
         return cache().unfinished_recordings()[0]
 
 
-class _RunningOperator(bpy.types.Operator):
+class _RunningOperator(Operator):
     """An operator on the running live capture. Not registered"""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require that one is running, and not being stopped."""
         return state.job is not None and not state.job.finishing
 
@@ -176,7 +177,7 @@ class SCOPE_OT_record_live(_RunningOperator):
     bl_label = "Record"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require that somebody was seen."""
         if not super().poll(context):
             return False
@@ -185,7 +186,7 @@ class SCOPE_OT_record_live(_RunningOperator):
             return refuse(cls, "Wait until somebody is seen")
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Begin the recording."""
         assert state.job is not None
         if not state.job.recording and not state.job.countdown_s:
@@ -204,7 +205,7 @@ class SCOPE_OT_stop_live(_RunningOperator):
     bl_idname = "scope.stop_live"
     bl_label = "Stop"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Ask the process to end; the modal operator does the rest."""
         assert state.job is not None
         state.job.stop()
@@ -212,25 +213,25 @@ class SCOPE_OT_stop_live(_RunningOperator):
         return {"FINISHED"}
 
 
-class SCOPE_OT_cancel_live(bpy.types.Operator):
+class SCOPE_OT_cancel_live(Operator):
     """Cancel the live capture; the scene stays unchanged, and nothing is recorded"""
 
     bl_idname = "scope.cancel_live"
     bl_label = "Cancel Live Capture"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require that one is running."""
         return state.job is not None
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """End the process and remove the body; the modal operator ends at its next event."""
         assert state.job is not None
         state.job.cancel()
         return {"FINISHED"}
 
 
-def play_scene(context: bpy.types.Context) -> None:
+def play_scene(context: Context) -> None:
     """Play the scene's animation from the frame at which a recording begins, if that is wanted"""
     scene = context.scene
     if scene.scope_live.with_scene and context.screen is not None:
@@ -240,7 +241,7 @@ def play_scene(context: bpy.types.Context) -> None:
         bpy.ops.screen.animation_play()
 
 
-def stop_scene(context: bpy.types.Context) -> None:
+def stop_scene(context: Context) -> None:
     """Stop the scene's animation where it is, whoever began it, if it was to play along"""
     if (
         context.scene.scope_live.with_scene
@@ -258,20 +259,20 @@ def redraw_viewports() -> None:
                 region.tag_redraw()
 
 
-class SCOPE_OT_camera_formats(bpy.types.Operator):
+class SCOPE_OT_camera_formats(Operator):
     """Query the camera's formats, without taking an image. macOS may ask for permission"""
 
     bl_idname = "scope.camera_formats"
     bl_label = "Camera Formats"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require that no camera is being asked or used."""
         if state.job is not None or state.asking is not None:
             return refuse(cls, "A camera is in use; wait for it or stop it")
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Start to ask; the panel shows the answer."""
         # Imported here: it loads numpy, which would slow down the start of Blender.
         from ..job.live_cameras import FormatsProcess, camera_source
@@ -321,7 +322,7 @@ def end_question() -> None:
     state.asking = None
 
 
-def draw_formats(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+def draw_formats(context: Context, layout: UILayout) -> None:
     """Show what the chosen camera has answered."""
     if state.asking is not None:
         draw_text(context, layout, iface_("Querying the camera"))
@@ -336,7 +337,7 @@ def draw_formats(context: bpy.types.Context, layout: bpy.types.UILayout) -> None
                 draw_text(context, layout, iface_("It reports no formats"))
 
 
-class SCOPE_PT_live(Tab, bpy.types.Panel):
+class SCOPE_PT_live(Tab, Panel):
     """Source, buttons and state of live captures."""
 
     bl_idname = "SCOPE_PT_live"
@@ -344,7 +345,7 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
     bl_order = 1
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw_header_preset(self, context: bpy.types.Context) -> None:
+    def draw_header_preset(self, context: Context) -> None:
         """Draw what is running, and the button that stops it, in the header, which is visible while
         the panel is closed.
         """
@@ -359,7 +360,7 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
         elif state.message_in(context.scene):
             layout.label(text="", icon="ERROR")
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the panel."""
         layout = self.layout
         settings = context.scene.scope_live
@@ -407,7 +408,7 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
             draw_text(context, layout.box(), message, "ERROR")
 
 
-def _draw_unfinished(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+def _draw_unfinished(context: Context, layout: UILayout) -> None:
     """Say that a recording was not finished, and offer to."""
     if cache().unfinished_recordings():
         box = layout.box()
@@ -415,7 +416,7 @@ def _draw_unfinished(context: bpy.types.Context, layout: bpy.types.UILayout) -> 
         box.operator("scope.finish_recording")
 
 
-def _draw_rig(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+def _draw_rig(layout: UILayout, context: Context) -> None:
     settings = context.scene.scope_live
     row = layout.row(align=True)
     row.prop(settings, "with_rig")
@@ -423,7 +424,7 @@ def _draw_rig(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         row.prop(context.scene.scope_retarget, "rig", text="")
 
 
-def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout, job: LiveJob) -> None:
+def _draw_status(context: Context, layout: UILayout, job: LiveJob) -> None:
     text, icon = _status(job)
     draw_text(context, layout.box() if icon == "ERROR" else layout, text, icon)
     presence = job.status.presence

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
+from bpy.types import Context, PropertyGroup
 
 from ..footage import display_address, has_login
 from ..options import Place
@@ -22,14 +23,12 @@ _addresses: dict[str, str] = {}  # whole ones, by what is left of them without t
 _SECRET = re.compile(r"[?#;&][^=]*(auth|key|login|pass|pw|secret|sig|token|user)[^=]*=", re.I)
 
 
-def _forget_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+def _forget_message(_settings: PropertyGroup, _context: Context) -> None:
     """Clear the error message, which was about another source."""
     state.message = ""
 
 
-def _cameras(
-    _settings: bpy.types.PropertyGroup, _context: bpy.types.Context, typed: str
-) -> list[str]:
+def _cameras(_settings: PropertyGroup, _context: Context, typed: str) -> list[str]:
     """Return the cameras whose number or name contains what was typed, with formats where these are
     known.
     """
@@ -42,7 +41,7 @@ def _cameras(
     return [label for label in labels if typed.lower() in label.lower()]
 
 
-def _keep_login(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+def _keep_login(settings: PropertyGroup, _context: Context) -> None:
     """Take name and password out of the address, so that no .blend file contains them."""
     state.message = ""
     address = take_login(settings.stream)
@@ -51,7 +50,7 @@ def _keep_login(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) 
 
 
 @with_options(Place.LIVE_PANEL)
-class SCOPE_PG_live(bpy.types.PropertyGroup):
+class SCOPE_PG_live(PropertyGroup):
     """The settings of live captures: the source, and the declared options."""
 
     source: EnumProperty(

@@ -6,6 +6,7 @@ them.
 from __future__ import annotations
 
 import bpy
+from bpy.types import Context, Menu, UILayout
 
 from .captured_person import captured_armature
 from .edit_panel import draw_corrections
@@ -13,13 +14,13 @@ from .export_operators import FORMATS, is_available
 from .reporting import iface_
 
 
-class SCOPE_MT_export(bpy.types.Menu):
+class SCOPE_MT_export(Menu):
     """Formats of captured motion"""
 
     bl_idname = "SCOPE_MT_export"
     bl_label = "Captured Motion (Mocap)"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the menu."""
         layout = self.layout
         layout.operator_context = "INVOKE_DEFAULT"
@@ -32,13 +33,13 @@ class SCOPE_MT_export(bpy.types.Menu):
             row.operator("scope.export", text=text).format = key
 
 
-class SCOPE_MT_motion_capture(bpy.types.Menu):
+class SCOPE_MT_motion_capture(Menu):
     """Capture motion from video, and view, edit, retarget and export captured motion"""
 
     bl_idname = "SCOPE_MT_motion_capture"
     bl_label = "Motion Capture"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the menu."""
         layout = self.layout
         layout.operator_context = "INVOKE_DEFAULT"
@@ -62,7 +63,7 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
         layout.menu(SCOPE_MT_export.bl_idname, text="Export", icon="EXPORT")
 
 
-def draw_import_video(layout: bpy.types.UILayout, icon: str) -> None:
+def draw_import_video(layout: UILayout, icon: str) -> None:
     """Draw the entry with the words people search for: its own count more than those of the menus
     that lead to it.
     """
@@ -71,24 +72,24 @@ def draw_import_video(layout: bpy.types.UILayout, icon: str) -> None:
     )
 
 
-def _draw_import_motion(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def _draw_import_motion(self: Menu, _context: Context) -> None:
     self.layout.operator("scope.import_motion", text="Scope, SMPL or BVH Motion")
 
 
-def _draw_import(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def _draw_import(self: Menu, _context: Context) -> None:
     draw_import_video(self.layout, "NONE")
 
 
-def _draw_export(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def _draw_export(self: Menu, _context: Context) -> None:
     self.layout.menu(SCOPE_MT_export.bl_idname)
 
 
-def _draw_motion_capture(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def _draw_motion_capture(self: Menu, _context: Context) -> None:
     self.layout.separator()
     self.layout.menu(SCOPE_MT_motion_capture.bl_idname)
 
 
-def _draw_pin_limb(self: bpy.types.Menu, context: bpy.types.Context) -> None:
+def _draw_pin_limb(self: Menu, context: Context) -> None:
     if captured_armature(context) is not None:
         self.layout.separator()
         self.layout.operator("scope.pin_limb", icon="PINNED")

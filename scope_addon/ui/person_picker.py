@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import bpy
+from bpy.types import Context, Event, Operator, Region
 
 from ...solver.errors import ScopeError
 from . import comparison
@@ -59,7 +60,7 @@ def person_at(
     return f"{x:.0f},{y:.0f}@{time_s:.2f}"
 
 
-class SCOPE_OT_pick_person(bpy.types.Operator):
+class SCOPE_OT_pick_person(Operator):
     """Choose whom to capture by a click on a frame of the footage"""
 
     bl_idname = "scope.pick_person"
@@ -67,7 +68,7 @@ class SCOPE_OT_pick_person(bpy.types.Operator):
     bl_options = {"UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a viewport, footage of one camera, and that nothing is running."""
         if context.area is None or context.area.type != "VIEW_3D" or not nothing_runs(cls):
             return False
@@ -80,7 +81,7 @@ class SCOPE_OT_pick_person(bpy.types.Operator):
             return refuse(cls, "In each clip of the list, somebody else is at that place")
         return True
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Show the first frame of the part that is captured, and wait for the click."""
         settings = context.scene.scope
         self._process: PictureProcess | None = None
@@ -102,7 +103,7 @@ class SCOPE_OT_pick_person(bpy.types.Operator):
         redraw_viewport(self._area)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         """Wait for the frame and the click."""
         x, y = self._pointer.place(event)
         viewport = region_at(self._area)
@@ -125,7 +126,7 @@ class SCOPE_OT_pick_person(bpy.types.Operator):
                 return {"FINISHED"}
         return {"RUNNING_MODAL"}
 
-    def cancel(self, context: bpy.types.Context) -> None:
+    def cancel(self, context: Context) -> None:
         """Remove the frame, and end the process that decodes one."""
         if self._process is not None:
             self._process.close()
@@ -137,7 +138,7 @@ class SCOPE_OT_pick_person(bpy.types.Operator):
         redraw_viewport(self._area)
         redraw_sidebars()
 
-    def _ask(self, context: bpy.types.Context, time_s: float) -> bool:
+    def _ask(self, context: Context, time_s: float) -> bool:
         """Start to decode the frame at a time; return whether that worked."""
         from ..job.footage_picture import PictureProcess
         from ..job.request import PictureRequest
@@ -215,7 +216,7 @@ def _texture(picture: FootagePicture) -> Any:
     return gpu.types.GPUTexture(picture.shown_size, format="SRGB8_A8", data=buffer)
 
 
-def _draw_text(region: bpy.types.Region, text: str) -> None:
+def _draw_text(region: Region, text: str) -> None:
     import blf
 
     blf.size(0, 14 * bpy.context.preferences.system.ui_scale)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 import bpy
+from bpy.types import Area, Context, Event, Object, Operator, Region, Window
 from mathutils import Vector
 
 from ..scene.character.correction_list import listed_corrections
@@ -55,7 +56,7 @@ class _Session:
             _draw, (self,), "WINDOW", "POST_PIXEL"
         )
 
-    def follow(self, active: bpy.types.Object | None) -> None:
+    def follow(self, active: Object | None) -> None:
         """Show the handles of the active person, whom a click on the body may have changed."""
         if active is not None and active.name != self.armature:
             self.armature = active.name
@@ -87,7 +88,7 @@ def detach() -> None:
         _running.end()
 
 
-class SCOPE_OT_pin_limb(bpy.types.Operator):
+class SCOPE_OT_pin_limb(Operator):
     """Drag handles on the body to where the joints are in this frame"""
 
     bl_description = (
@@ -98,13 +99,13 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
     bl_label = "Pin Limbs"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a captured armature in a 3D viewport."""
         if context.area is None or context.area.type != "VIEW_3D":
             return False
         return may_edit(cls, context)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Show the handles; hide them if they are shown."""
         global _running
         if _running is not None:
@@ -119,7 +120,7 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
         _redraw()
         return {"RUNNING_MODAL"}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         """Follow the mouse."""
         session = self._session
         if session is not _running:  # ended by its button
@@ -157,14 +158,12 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
             area.tag_redraw()
         return {"RUNNING_MODAL"} if busy else {"PASS_THROUGH"}
 
-    def cancel(self, context: bpy.types.Context) -> None:
+    def cancel(self, context: Context) -> None:
         """Remove the handles."""
         self._session.end()
         context.workspace.status_text_set(None)
 
-    def _drop(
-        self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region
-    ) -> None:
+    def _drop(self, context: Context, area: Area, region: Region) -> None:
         """Pin the dragged joint under the mouse, which is a step to undo of its own."""
         from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_location_3d
 
@@ -217,7 +216,7 @@ def _redraw() -> None:
     redraw_sidebars()
 
 
-def _move_to_viewport(session: _Session, window: bpy.types.Window, at: tuple[int, int]) -> None:
+def _move_to_viewport(session: _Session, window: Window, at: tuple[int, int]) -> None:
     """Go on in the viewport under the mouse, if there is one.
 
     :param at: pixels of the window.
@@ -237,7 +236,7 @@ def _joint_positions(session: _Session) -> dict[str, Vector]:
     return {name: armature.matrix_world @ bones[name].head for name in HANDLES if name in bones}
 
 
-def _nearest(session: _Session, area: bpy.types.Area, region: bpy.types.Region) -> str:
+def _nearest(session: _Session, area: Area, region: Region) -> str:
     """Return the handle under the mouse, or an empty name"""
     from bpy_extras.view3d_utils import location_3d_to_region_2d
 

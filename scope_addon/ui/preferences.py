@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import IntProperty, StringProperty
+from bpy.types import Context, Operator, Scene, UILayout
 
 from ..options import Place
 from .declared_properties import split, with_options
@@ -61,7 +62,7 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
         "first",
     )
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the preferences."""
         layout = split(self.layout)
         layout.prop(self, "threads")
@@ -83,7 +84,7 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
         row.operator("scope.clear_cache")
 
 
-class SCOPE_OT_clear_cache(bpy.types.Operator):
+class SCOPE_OT_clear_cache(Operator):
     """Remove captured motion from the cache"""
 
     bl_description = (
@@ -93,7 +94,7 @@ class SCOPE_OT_clear_cache(bpy.types.Operator):
     bl_idname = "scope.clear_cache"
     bl_label = "Clear Cache"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Remove the files."""
         freed = cache().clear()
         _measured.clear()
@@ -101,13 +102,13 @@ class SCOPE_OT_clear_cache(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_OT_documentation(bpy.types.Operator):
+class SCOPE_OT_documentation(Operator):
     """Open the guide, which comes with Scope, in the web browser; the network is not used"""
 
     bl_idname = "scope.documentation"
     bl_label = "Documentation"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Open it."""
         bpy.ops.wm.url_open(url=guide().as_uri())
         return {"FINISHED"}
@@ -130,7 +131,7 @@ def preferences() -> SCOPE_AP_preferences | None:
     return addon.preferences if addon else None
 
 
-def body_file(scene: bpy.types.Scene) -> str:
+def body_file(scene: Scene) -> str:
     """Return the path of the body file that is chosen in a scene or else in the preferences; empty
     if none is.
     """
@@ -219,7 +220,7 @@ def detach() -> None:
     _shortcuts.clear()
 
 
-def _draw_shortcut(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+def _draw_shortcut(layout: UILayout, context: Context) -> None:
     """Draw the shortcut as the preferences' keymap editor does, where it can be changed."""
     import rna_keymap_ui
 

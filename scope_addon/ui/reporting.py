@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 from bpy.app.translations import pgettext_iface, pgettext_rpt, pgettext_tip
+from bpy.types import Context, Operator, PropertyGroup
 
 from ...solver.errors import ScopeError
 from ..errors import SetupError
@@ -49,7 +50,7 @@ def tip_(text: str, **values: object) -> str:
     return translated.format(**values) if values else translated
 
 
-def refuse(operator: type[bpy.types.Operator], reason: str, **values: object) -> bool:
+def refuse(operator: type[Operator], reason: str, **values: object) -> bool:
     """Say in the user's language why an operator cannot be used, with values for placeholders;
     return False, as its ``poll`` then does.
     """
@@ -76,7 +77,7 @@ def warning_text(warning: Notice, translate: Translate = iface_) -> str:
     return sentence(warning.text(translate), str(warning.values.get("footage", "")))
 
 
-class ReportingOperator(bpy.types.Operator):
+class ReportingOperator(Operator):
     """An operator that runs ``work`` and reports the result, or the error's message. Not
     registered.
     """
@@ -85,10 +86,10 @@ class ReportingOperator(bpy.types.Operator):
 
     if TYPE_CHECKING:  # implemented by each operator
 
-        def work(self, context: bpy.types.Context) -> str:
+        def work(self, context: Context) -> str:
             """Do the work and return a message for the user, which may be empty."""
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Run ``work`` and report."""
         try:
             restore_libraries()
@@ -139,9 +140,7 @@ def _missing() -> list[str]:
     ]
 
 
-def add_warning(
-    shown: bpy.types.PropertyGroup, warning: Notice, spans: Sequence[FrameSpan] = ()
-) -> None:
+def add_warning(shown: PropertyGroup, warning: Notice, spans: Sequence[FrameSpan] = ()) -> None:
     """Store a warning with a result: its English text, and the record from which it is shown in the
     user's language.
     """
@@ -153,7 +152,7 @@ def add_warning(
     stored.spans = spans_text(spans)
 
 
-def stored_warning(stored: bpy.types.PropertyGroup) -> Notice:
+def stored_warning(stored: PropertyGroup) -> Notice:
     """Return a warning of a result. Of one whose record is damaged or missing, the text is left."""
     import json
 

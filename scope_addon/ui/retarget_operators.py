@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import bpy
 from bpy.props import EnumProperty, StringProperty
+from bpy.types import Context, Event, Object, Operator, PropertyGroup
 
 from ...solver.errors import ScopeError
 from ..errors import UsageError
@@ -30,9 +31,7 @@ if TYPE_CHECKING:
 SHAPE_KEY = "key"  # the channel of entries of shape keys
 
 
-def is_in_view_layer(
-    cls: type[bpy.types.Operator], context: bpy.types.Context, chosen: bpy.types.Object
-) -> bool:
+def is_in_view_layer(cls: type[Operator], context: Context, chosen: Object) -> bool:
     """Return whether an object that was chosen can be animated here: one that is deleted stays
     chosen.
     """
@@ -52,7 +51,7 @@ class MapFileOperator(ReportingOperator):
     filepath: StringProperty(subtype="FILE_PATH")
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Ask for the file."""
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
@@ -65,7 +64,7 @@ class SaveMapOperator(SavingOperator, MapFileOperator):
         """Return that of maps."""
         return ".json"
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Write the file.
 
         :raises UsageError: the file has no name, or is beside a .blend file that was never saved.
@@ -76,7 +75,7 @@ class SaveMapOperator(SavingOperator, MapFileOperator):
 
     if TYPE_CHECKING:  # implemented by each operator
 
-        def save(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+        def save(self, settings: PropertyGroup, path: str) -> None:
             """Write the map of the settings to a path.
 
             :raises InputError: it could not be loaded again.
@@ -86,14 +85,14 @@ class SaveMapOperator(SavingOperator, MapFileOperator):
 class LoadMapOperator(MapFileOperator):
     """Reads a map; a subclass has ``load``. Not registered."""
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Fill the list."""
         self.load(context.scene.scope_retarget, bpy.path.abspath(self.filepath))
         return rpt_("Loaded {file}", file=self.filepath)
 
     if TYPE_CHECKING:  # implemented by each operator
 
-        def load(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+        def load(self, settings: PropertyGroup, path: str) -> None:
             """Fill the list of the settings from a path."""
 
 
@@ -112,7 +111,7 @@ class EditListOperator(ReportingOperator):
         def message(self, count: int) -> str:
             """Return how many entries there are now."""
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Change the list."""
         settings = context.scene.scope_retarget
         listed = getattr(settings, self.entries)
@@ -126,12 +125,12 @@ class EditListOperator(ReportingOperator):
         setattr(settings, self.active, active)
         return self.message(len(listed))
 
-    def add(self, settings: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup:
+    def add(self, settings: PropertyGroup) -> PropertyGroup:
         """Add an entry, and return it."""
         return getattr(settings, self.entries).add()
 
 
-def guess_into_list(settings: bpy.types.PropertyGroup) -> None:
+def guess_into_list(settings: PropertyGroup) -> None:
     """Fill the list with a guess for the chosen rig; leave it empty if nothing can be guessed.
 
     :param settings: of retargeting, with a rig.
@@ -145,7 +144,7 @@ def guess_into_list(settings: bpy.types.PropertyGroup) -> None:
         return  # the operators report why
 
 
-def fill_list(settings: bpy.types.PropertyGroup, bone_map: BoneMap) -> None:
+def fill_list(settings: PropertyGroup, bone_map: BoneMap) -> None:
     """Fill the list with a map, in the order of the body's parts."""
     from ..retarget.bone_map import PARTS
 
@@ -158,7 +157,7 @@ def fill_list(settings: bpy.types.PropertyGroup, bone_map: BoneMap) -> None:
     settings.active = 0
 
 
-def listed_map(settings: bpy.types.PropertyGroup) -> BoneMap:
+def listed_map(settings: PropertyGroup) -> BoneMap:
     """Return the list as a map; entries without a bone or a part are left out."""
     from ..retarget.bone_map import BoneMap
 
@@ -176,26 +175,26 @@ def common_prefix(bones: list[str]) -> str:
     return shared[: 1 + max(shared.rfind(separator) for separator in ":_. ")]
 
 
-def bones_move(face: bpy.types.Object | None) -> bool:
+def bones_move(face: Object | None) -> bool:
     """Return whether a face is a rig whose bones move it, and Scope knows which."""
     from ..scene.face_retarget import has_bone_face
 
     return face is not None and not is_person(face) and has_bone_face(face)
 
 
-def has_targets(face: bpy.types.Object | None) -> bool:
+def has_targets(face: Object | None) -> bool:
     """Return whether an object is a face: it has shape keys, or bones move it."""
     if face is not None and face.type == "MESH":
         return face.data.shape_keys is not None
     return bones_move(face)
 
 
-def targets_of(face: bpy.types.Object) -> bpy.types.bpy_prop_collection:
+def targets_of(face: Object) -> bpy.types.bpy_prop_collection:
     """Return a face's bones or shape keys."""
     return face.data.bones if face.type == "ARMATURE" else face.data.shape_keys.key_blocks
 
 
-def face_of_rig(rig: bpy.types.Object) -> bpy.types.Object | None:
+def face_of_rig(rig: Object) -> Object | None:
     """Return the rig if its bones move its face, and no shape keys of its meshes with names that
     are known.
     """
@@ -209,7 +208,7 @@ def face_of_rig(rig: bpy.types.Object) -> bpy.types.Object | None:
     )
 
 
-def guessed_map(face: bpy.types.Object) -> ExpressionMap:
+def guessed_map(face: Object) -> ExpressionMap:
     """Return the map that the names of a face's shape keys or bones suggest."""
     from ..retarget.expression_map import guess_expression_map
     from ..scene.face_retarget import guess_face_bones, key_names
@@ -217,14 +216,14 @@ def guessed_map(face: bpy.types.Object) -> ExpressionMap:
     return guess_face_bones(face) if bones_move(face) else guess_expression_map(key_names([face]))
 
 
-def listed_or_guessed(settings: bpy.types.PropertyGroup) -> ExpressionMap:
+def listed_or_guessed(settings: PropertyGroup) -> ExpressionMap:
     """Return the list as a map or, if it is empty, the map that the names of the chosen face
     suggest.
     """
     return listed_expressions(settings) if len(settings.face_pairs) else guessed_map(settings.face)
 
 
-def fill_expressions(settings: bpy.types.PropertyGroup, expression_map: ExpressionMap) -> None:
+def fill_expressions(settings: PropertyGroup, expression_map: ExpressionMap) -> None:
     """Fill the list with a map, one entry for each expression of a shape key or of a control's
     channel.
     """
@@ -245,7 +244,7 @@ def fill_expressions(settings: bpy.types.PropertyGroup, expression_map: Expressi
     settings.face_active = 0
 
 
-def listed_expressions(settings: bpy.types.PropertyGroup) -> ExpressionMap:
+def listed_expressions(settings: PropertyGroup) -> ExpressionMap:
     """Return the list as a map; entries without a shape key or control, or without an expression,
     are left out.
     """
@@ -270,7 +269,7 @@ class _RigOperator(ReportingOperator):
     """An operator on the chosen rig. Not registered"""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a rig in the view layer."""
         rig = context.scene.scope_retarget.rig
         if rig is None:
@@ -284,7 +283,7 @@ class SCOPE_OT_guess_bones(_RigOperator):
     bl_idname = "scope.guess_bones"
     bl_label = "Guess Bones"
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Fill the list."""
         from ..scene.rig_retarget import guess_bone_map, map_notices
 
@@ -312,7 +311,7 @@ class SCOPE_OT_retarget(_RigOperator):
     bl_label = "Retarget"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a rig that can be animated in this file, and a captured person."""
         if not super().poll(context):
             return False
@@ -336,7 +335,7 @@ class SCOPE_OT_retarget(_RigOperator):
             )
         return True
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Write the rig's keys."""
         settings = context.scene.scope_retarget
         source = captured_armature(context)
@@ -354,7 +353,7 @@ class SCOPE_OT_retarget(_RigOperator):
         return self.report_all(message, result.warnings)
 
 
-def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object) -> RetargetResult:
+def retarget_to_chosen_rig(context: Context, source: Object) -> RetargetResult:
     """Retarget a captured armature to the rig of the settings, and show both as the settings say.
 
     :raises ScopeError: the rig or its bones cannot be used; nothing is changed.
@@ -390,7 +389,7 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
     return result
 
 
-def face_map(settings: bpy.types.PropertyGroup) -> ExpressionMap | None:
+def face_map(settings: PropertyGroup) -> ExpressionMap | None:
     """Return the expression map if the chosen face is the rig's own, which its bones move;
     otherwise None.
     """
@@ -400,7 +399,7 @@ def face_map(settings: bpy.types.PropertyGroup) -> ExpressionMap | None:
 
 
 def retarget_options(
-    settings: bpy.types.PropertyGroup, face: ExpressionMap | None = None, metre: float = 1.0
+    settings: PropertyGroup, face: ExpressionMap | None = None, metre: float = 1.0
 ) -> RetargetOptions:
     """Return the options of the settings.
 
@@ -427,7 +426,7 @@ class SCOPE_OT_save_bone_map(_RigOperator, SaveMapOperator):
 
     filepath: StringProperty(subtype="FILE_PATH", default="bones.json")
 
-    def save(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+    def save(self, settings: PropertyGroup, path: str) -> None:
         """Write the list."""
         from ..retarget.bone_map import save_bone_map
 
@@ -440,7 +439,7 @@ class SCOPE_OT_load_bone_map(_RigOperator, LoadMapOperator):
     bl_idname = "scope.load_bone_map"
     bl_label = "Load Bone Map"
 
-    def load(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+    def load(self, settings: PropertyGroup, path: str) -> None:
         """Read the list."""
         from ..retarget.bone_map import load_bone_map
 
@@ -464,7 +463,7 @@ class _FaceOperator(ReportingOperator):
     """An operator on the chosen face. Not registered"""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a mesh with shape keys, or a rig whose face is known, in the view layer."""
         face = context.scene.scope_retarget.face
         if not has_targets(face):
@@ -482,7 +481,7 @@ class SCOPE_OT_guess_expressions(_FaceOperator):
     bl_idname = "scope.guess_expressions"
     bl_label = "Guess Expressions"
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Fill the list.
 
         :raises UsageError: no name is known; the list stays as it is.
@@ -517,7 +516,7 @@ class SCOPE_OT_retarget_face(_FaceOperator):
     bl_label = "Retarget Face"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a face that can be animated in this file, and a captured person."""
         if not super().poll(context):
             return False
@@ -536,7 +535,7 @@ class SCOPE_OT_retarget_face(_FaceOperator):
             return refuse(cls, "Select the captured person whose face to retarget")
         return True
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Write the keys.
 
         :raises UsageError: the person's face was not captured, or no shape key or control is
@@ -582,7 +581,7 @@ class SCOPE_OT_save_expression_map(_FaceOperator, SaveMapOperator):
 
     filepath: StringProperty(subtype="FILE_PATH", default="expressions.json")
 
-    def save(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+    def save(self, settings: PropertyGroup, path: str) -> None:
         """Write the list."""
         from ..retarget.expression_map import save_expression_map
 
@@ -595,7 +594,7 @@ class SCOPE_OT_load_expression_map(_FaceOperator, LoadMapOperator):
     bl_idname = "scope.load_expression_map"
     bl_label = "Load Expression Map"
 
-    def load(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+    def load(self, settings: PropertyGroup, path: str) -> None:
         """Read the list."""
         from ..retarget.expression_map import load_expression_map
 
@@ -610,7 +609,7 @@ class SCOPE_OT_edit_expression_pair(_FaceOperator, EditListOperator):
     entries = "face_pairs"
     active = "face_active"
 
-    def add(self, settings: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup:
+    def add(self, settings: PropertyGroup) -> PropertyGroup:
         """Add an entry of the kind that the face has."""
         entry = super().add(settings)
         if bones_move(settings.face):

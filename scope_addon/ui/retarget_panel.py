@@ -16,6 +16,7 @@ from bpy.props import (
     PointerProperty,
     StringProperty,
 )
+from bpy.types import Context, Object, Panel, PropertyGroup, UILayout, UIList
 
 from ..scene.datablocks import is_person
 from .capture_panel import PersonTab, Tab
@@ -34,17 +35,17 @@ from .retarget_operators import (
 from .translations import CONTEXT
 
 
-class SCOPE_UL_bone_pairs(bpy.types.UIList):
+class SCOPE_UL_bone_pairs(UIList):
     """Bones of the rig and the body parts that they follow."""
 
     def draw_item(
         self,
-        _context: bpy.types.Context,
-        layout: bpy.types.UILayout,
-        settings: bpy.types.PropertyGroup,
-        item: bpy.types.PropertyGroup,
+        _context: Context,
+        layout: UILayout,
+        settings: PropertyGroup,
+        item: PropertyGroup,
         _icon: int,
-        _settings_with_active: bpy.types.PropertyGroup,
+        _settings_with_active: PropertyGroup,
         _active_property: str,
     ) -> None:
         """Draw one entry: part, bone, and a question mark if the guess is uncertain.
@@ -64,14 +65,14 @@ class SCOPE_UL_bone_pairs(bpy.types.UIList):
             row.label(text="", icon="QUESTION" if known else "ERROR")
 
 
-class SCOPE_PT_retarget(PersonTab, bpy.types.Panel):
+class SCOPE_PT_retarget(PersonTab, Panel):
     """Retargeting of the captured motion to the user's rig."""
 
     bl_idname = "SCOPE_PT_retarget"
     bl_label = "Retarget"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the panel."""
         layout = self.layout
         settings = context.scene.scope_retarget
@@ -94,17 +95,17 @@ class SCOPE_PT_retarget(PersonTab, bpy.types.Panel):
         layout.operator("scope.retarget", icon="ARMATURE_DATA")
 
 
-class SCOPE_UL_expression_pairs(bpy.types.UIList):
+class SCOPE_UL_expression_pairs(UIList):
     """Shape keys or controls of the face and the expressions that they follow."""
 
     def draw_item(
         self,
-        _context: bpy.types.Context,
-        layout: bpy.types.UILayout,
-        settings: bpy.types.PropertyGroup,
-        item: bpy.types.PropertyGroup,
+        _context: Context,
+        layout: UILayout,
+        settings: PropertyGroup,
+        item: PropertyGroup,
         _icon: int,
-        _settings_with_active: bpy.types.PropertyGroup,
+        _settings_with_active: PropertyGroup,
         _active_property: str,
     ) -> None:
         """Draw one entry: expression, and shape key or control with its channel; see
@@ -129,7 +130,7 @@ class SCOPE_UL_expression_pairs(bpy.types.UIList):
             row.label(text="", icon="ERROR")
 
 
-class SCOPE_PT_retarget_face(Tab, bpy.types.Panel):
+class SCOPE_PT_retarget_face(Tab, Panel):
     """Retargeting of captured expressions to shape keys of the user's mesh, or to the bones of a
     rig's face.
     """
@@ -139,7 +140,7 @@ class SCOPE_PT_retarget_face(Tab, bpy.types.Panel):
     bl_label = "Face"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the panel."""
         layout = self.layout
         settings = context.scene.scope_retarget
@@ -163,12 +164,8 @@ class SCOPE_PT_retarget_face(Tab, bpy.types.Panel):
 
 
 def _draw_map(
-    layout: bpy.types.UILayout,
-    settings: bpy.types.PropertyGroup,
-    kind: str,
-    entries: str,
-    active: str,
-) -> list[bpy.types.PropertyGroup]:
+    layout: UILayout, settings: PropertyGroup, kind: str, entries: str, active: str
+) -> list[PropertyGroup]:
     """Draw the buttons and the list of a map; return its active entry alone, if there is one.
 
     :param kind: ``bone`` or ``expression``, as in the names of operators and lists.
@@ -188,7 +185,7 @@ def _draw_map(
     return list(listed[chosen : chosen + 1])
 
 
-def _is_known(face: bpy.types.Object | None, pair: bpy.types.PropertyGroup) -> bool:
+def _is_known(face: Object | None, pair: PropertyGroup) -> bool:
     """Return whether the chosen face has the shape key or the control of an entry."""
     if (
         face is None
@@ -199,16 +196,14 @@ def _is_known(face: bpy.types.Object | None, pair: bpy.types.PropertyGroup) -> b
     return pair.key in targets_of(face)
 
 
-def offered_parts(
-    _pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str
-) -> list[str]:
+def offered_parts(_pair: PropertyGroup | None, _context: Context, typed: str) -> list[str]:
     """Return the body parts whose names contain what was typed so far, for Blender to suggest."""
     from ..retarget.bone_map import PARTS
 
     return [part for part in PARTS if typed.lower() in part]
 
 
-class SCOPE_PG_bone_pair(bpy.types.PropertyGroup):
+class SCOPE_PG_bone_pair(PropertyGroup):
     """One bone of the user's rig and the body part that it follows."""
 
     bone: StringProperty(name="Bone", description="Bone of your rig")
@@ -222,16 +217,14 @@ class SCOPE_PG_bone_pair(bpy.types.PropertyGroup):
     )
 
 
-def offered_expressions(
-    _pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str
-) -> list[str]:
+def offered_expressions(_pair: PropertyGroup | None, _context: Context, typed: str) -> list[str]:
     """Return the expressions whose names contain what was typed so far, for Blender to suggest."""
     from ..kinematics.face import EXPRESSIONS
 
     return [name for name in EXPRESSIONS if typed.lower() in name.lower()]
 
 
-class SCOPE_PG_expression_pair(bpy.types.PropertyGroup):
+class SCOPE_PG_expression_pair(PropertyGroup):
     """One shape key of the user's mesh, or channel of a rig's control, and an expression that it
     follows.
     """
@@ -282,16 +275,16 @@ class SCOPE_PG_expression_pair(bpy.types.PropertyGroup):
     )
 
 
-def _is_face(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
+def _is_face(_settings: PropertyGroup, obj: Object) -> bool:
     captured = obj.parent is not None and is_person(obj.parent)
     return not captured and has_targets(obj)
 
 
-def _is_armature(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
+def _is_armature(_settings: PropertyGroup, obj: Object) -> bool:
     return obj.type == "ARMATURE" and not is_person(obj)
 
 
-def _list_bones_of_new_rig(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+def _list_bones_of_new_rig(settings: PropertyGroup, _context: Context) -> None:
     """Replace the bone list of another rig by a guess; keep that of the same rig, or of one with
     the same bones.
 
@@ -313,7 +306,7 @@ def _list_bones_of_new_rig(settings: bpy.types.PropertyGroup, _context: bpy.type
     guess_into_list(settings)
 
 
-def _list_keys_of_new_face(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+def _list_keys_of_new_face(settings: PropertyGroup, _context: Context) -> None:
     """Replace the expression list of another face by a guess; keep that of one with the same shape
     keys or bones.
     """
@@ -328,12 +321,12 @@ def _list_keys_of_new_face(settings: bpy.types.PropertyGroup, _context: bpy.type
     fill_expressions(settings, guessed_map(settings.face))
 
 
-class SCOPE_PG_retarget(bpy.types.PropertyGroup):
+class SCOPE_PG_retarget(PropertyGroup):
     """The settings of retargeting."""
 
     rig: PointerProperty(
         name="Rig",
-        type=bpy.types.Object,
+        type=Object,
         poll=_is_armature,
         update=_list_bones_of_new_rig,
         description="Armature to animate with the captured motion",
@@ -344,7 +337,7 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
     active: IntProperty()
     face: PointerProperty(
         name="Face",
-        type=bpy.types.Object,
+        type=Object,
         poll=_is_face,
         update=_list_keys_of_new_face,
         description="Mesh with shape keys, or rig whose bones move its face, to animate with the "

@@ -21,6 +21,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import Object, Scene
 
 from ..arrays import Float64Array
 from ..errors import UsageError
@@ -33,7 +34,7 @@ _IMAGE_RATE = 30.0  # which captures assume for images
 _MAX_SCALE = 1e-3  # by which an object's axes may be longer or shorter than 1
 
 
-def scene_camera_path(scene: bpy.types.Scene) -> Path:
+def scene_camera_path(scene: Scene) -> Path:
     """Write the path of the scene's chosen camera to a file of this session, and return it.
 
     The camera is read in all frames of the scene's range. *First Frame* shows the footage's first
@@ -62,7 +63,7 @@ def scene_camera_path(scene: bpy.types.Scene) -> Path:
     return path
 
 
-def _content(scene: bpy.types.Scene, camera: bpy.types.Object) -> dict[str, Any]:
+def _content(scene: Scene, camera: Object) -> dict[str, Any]:
     """Return the content of the file: lens, times and poses."""
     render = scene.render
     first, rate = _footage_frames(scene, camera)
@@ -95,9 +96,7 @@ def _content(scene: bpy.types.Scene, camera: bpy.types.Object) -> dict[str, Any]
     }
 
 
-def _tracked_clips(
-    scene: bpy.types.Scene, camera: bpy.types.Object
-) -> list[bpy.types.MovieClip | None]:
+def _tracked_clips(scene: Scene, camera: Object) -> list[bpy.types.MovieClip | None]:
     """Return the clips in which Blender's tracker has solved the camera; None: a constraint has
     none.
     """
@@ -108,7 +107,7 @@ def _tracked_clips(
     ]
 
 
-def _footage_frames(scene: bpy.types.Scene, camera: bpy.types.Object) -> tuple[int, float]:
+def _footage_frames(scene: Scene, camera: Object) -> tuple[int, float]:
     """Return the scene's frame that shows the beginning of the footage, and how many of the next
     ones show a second of it.
 
@@ -124,7 +123,7 @@ def _footage_frames(scene: bpy.types.Scene, camera: bpy.types.Object) -> tuple[i
     return scene.scope.start_frame, render.fps / render.fps_base
 
 
-def _footage_rate(scene: bpy.types.Scene) -> float:
+def _footage_rate(scene: Scene) -> float:
     """Return the frame rate with which the footage is captured."""
     footage = bpy.path.abspath(scene.scope.footage)
     clip = bpy.data.movieclips.load(footage)
@@ -138,7 +137,7 @@ def _footage_rate(scene: bpy.types.Scene) -> float:
     return rate
 
 
-def _distortion(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[float]:
+def _distortion(scene: Scene, camera: Object) -> list[float]:
     """Return OpenCV's distortion k1, k2, p1, p2, k3 of the tracked clip's lens; zeros without one.
 
     Blender's cameras are pinholes, but the footage is as the lens has distorted it. Blender's
@@ -169,7 +168,7 @@ def _distortion(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[float]
     )
 
 
-def _is_solved(scene: bpy.types.Scene, camera: bpy.types.Object, frame: int) -> bool:
+def _is_solved(scene: Scene, camera: Object, frame: int) -> bool:
     """Return whether Blender's tracker has solved the camera in a frame, if it follows a track."""
     for clip in _tracked_clips(scene, camera):
         if clip is None:
@@ -181,7 +180,7 @@ def _is_solved(scene: bpy.types.Scene, camera: bpy.types.Object, frame: int) -> 
     return True
 
 
-def _intrinsics(scene: bpy.types.Scene, camera: bpy.types.Object) -> Float64Array:
+def _intrinsics(scene: Scene, camera: Object) -> Float64Array:
     """Return OpenCV's camera matrix (3, 3) of an evaluated camera, in pixels of the resolution.
 
     :raises UsageError: it is an orthographic or panoramic camera.
@@ -207,7 +206,7 @@ def _intrinsics(scene: bpy.types.Scene, camera: bpy.types.Object) -> Float64Arra
     return np.array([[fx, 0.0, cx], [0.0, fx / aspect, cy], [0.0, 0.0, 1.0]])
 
 
-def _pose(scene: bpy.types.Scene, camera: bpy.types.Object, frame: int) -> Float64Array:
+def _pose(scene: Scene, camera: Object, frame: int) -> Float64Array:
     """Return the pose (4, 4) of an evaluated camera in metres, with OpenCV's axes.
 
     :raises UsageError: it has a scale, or a value that is no finite number.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import EnumProperty, FloatVectorProperty
+from bpy.types import Area, Context, Event, Object, Operator, Region, Scene
 
 from ...solver.errors import ScopeError
 from ..errors import UsageError
@@ -47,9 +48,7 @@ class SCOPE_OT_set_upright(CorrectionOperator):
         name="End", size=2, description="Pixel of the footage, from its top left"
     )
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
+    def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
         """Move everybody of the capture, and the camera."""
         from ..edit.upright import upright_transform
 
@@ -61,12 +60,7 @@ class SCOPE_OT_set_upright(CorrectionOperator):
         return ""
 
 
-def _set_upright(
-    scene: bpy.types.Scene,
-    armature: bpy.types.Object,
-    motion: Motion,
-    transform: Float64Array,
-) -> None:
+def _set_upright(scene: Scene, armature: Object, motion: Motion, transform: Float64Array) -> None:
     """Move everybody of a capture, and the camera, by a transform (4, 4) of the world."""
     from ..edit.corrections import Upright, added
 
@@ -97,9 +91,7 @@ class SCOPE_OT_set_upright_in_view(CorrectionOperator):
         description="Direction of the scene in which the view looks",
     )
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
+    def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
         """Move everybody of the capture, and the camera."""
         import numpy as np
 
@@ -127,7 +119,7 @@ class _Line:
     area: int = 0
 
 
-class SCOPE_OT_upright_line(bpy.types.Operator):
+class SCOPE_OT_upright_line(Operator):
     """Draw a line along something upright"""
 
     bl_description = (
@@ -138,7 +130,7 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
     bl_label = "Upright Line"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a viewport in which the line can be drawn."""
         space = context.space_data
         areas = context.window.screen.areas if context.window else ()
@@ -154,7 +146,7 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
             )
         return may_edit(cls, context)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Wait for the line."""
         self._line = _Line()
         self._pointer = Pointer()
@@ -166,7 +158,7 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         """Follow the mouse."""
         line = self._line
         x, y = self._pointer.place(event)
@@ -198,16 +190,14 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
             return {"FINISHED"}
         return {"RUNNING_MODAL"}
 
-    def cancel(self, context: bpy.types.Context) -> None:
+    def cancel(self, context: Context) -> None:
         """Remove the line."""
         bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
         context.workspace.status_text_set(None)
         context.window.cursor_modal_restore()
         redraw_viewport(self._line.area)
 
-    def _finish(
-        self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region
-    ) -> None:
+    def _finish(self, context: Context, area: Area, region: Region) -> None:
         """Set what is upright, which is a step to undo of its own."""
         from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
@@ -230,7 +220,7 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
             self.report({"ERROR"}, sentence(str(error).removeprefix("Error: ")))
 
 
-def _takes_line(scene: bpy.types.Scene, area: bpy.types.Area) -> bool:
+def _takes_line(scene: Scene, area: Area) -> bool:
     """Return whether an area shows the footage through the capture's camera, or an orthographic
     view.
     """
@@ -243,7 +233,7 @@ def _takes_line(scene: bpy.types.Scene, area: bpy.types.Area) -> bool:
     return perspective == "ORTHO" or through_camera
 
 
-def _area_at(context: bpy.types.Context, x: int, y: int) -> bpy.types.Area | None:
+def _area_at(context: Context, x: int, y: int) -> Area | None:
     """Return the area under the mouse, unless it takes no line or a sidebar, toolbar or header is
     there.
     """
@@ -258,7 +248,7 @@ def _area_at(context: bpy.types.Context, x: int, y: int) -> bpy.types.Area | Non
     return None
 
 
-def _pixels(context: bpy.types.Context, points: list[object]) -> list[tuple[float, float]]:
+def _pixels(context: Context, points: list[object]) -> list[tuple[float, float]]:
     """Return the pixels of the footage at which points of the scene are.
 
     :raises UsageError: the person was removed, or their motion does not contain the current frame.
@@ -306,9 +296,7 @@ class SCOPE_OT_floor_here(CorrectionOperator):
         description="Which foot rests on the floor",
     )
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
+    def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
         """Move everybody of the capture, and the camera."""
         from ..edit.corrections import Floor, added
         from ..scene.character.corrected_keys import heights_of_foot

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 from bpy.props import IntProperty
+from bpy.types import ID, Collection, Context, Object, Operator, Scene
 from mathutils import Matrix
 
 from ..footage import PICTURE_SUFFIXES
@@ -19,7 +20,7 @@ from .reporting import ReportingOperator, refuse, rpt_
 from .viewports import main_region, redraw_sidebars_twice, viewport_of
 
 
-def hide_startup_cube(context: bpy.types.Context) -> None:
+def hide_startup_cube(context: Context) -> None:
     """Hide the unmodified default cube of an unsaved file, which is where the person stands, in
     viewports and renders.
     """
@@ -36,7 +37,7 @@ def hide_startup_cube(context: bpy.types.Context) -> None:
         cube.hide_render = True
 
 
-def frame_selected(context: bpy.types.Context) -> None:
+def frame_selected(context: Context) -> None:
     """Frame the selected objects in the context's or the largest viewport, unless it shows a
     camera's view.
     """
@@ -50,7 +51,7 @@ def frame_selected(context: bpy.types.Context) -> None:
             bpy.ops.view3d.view_selected()
 
 
-def show_new_capture(context: bpy.types.Context, scene: bpy.types.Scene | None) -> None:
+def show_new_capture(context: Context, scene: Scene | None) -> None:
     """Show the capture that was just added to a scene: the viewports leave the comparison of an
     earlier one.
 
@@ -70,13 +71,13 @@ def show_new_capture(context: bpy.types.Context, scene: bpy.types.Scene | None) 
     frame_selected(context)
 
 
-def _hide_others_again(context: bpy.types.Context, shown: bpy.types.Collection) -> None:
+def _hide_others_again(context: Context, shown: Collection) -> None:
     """Hide people of other captures than the shown one who were shown for a comparison alone."""
     for other in [obj for obj in captured_people(context) if not holds(shown, obj)]:
         hide_again(other, context.view_layer)
 
 
-def _set_camera(context: bpy.types.Context, camera: bpy.types.Object, filmed: bpy.types.ID) -> None:
+def _set_camera(context: Context, camera: Object, filmed: ID) -> None:
     """Set the scene's camera, and the resolution to that of the footage.
 
     :param filmed: what stores the footage's resolution: a capture, or a further camera.
@@ -89,7 +90,7 @@ def _set_camera(context: bpy.types.Context, camera: bpy.types.Object, filmed: bp
     set_resolution(context.scene, filmed)
 
 
-class SCOPE_OT_look_through(bpy.types.Operator):
+class SCOPE_OT_look_through(Operator):
     """Toggle the view of the body over the footage. Sets the scene's camera and resolution"""
 
     bl_idname = "scope.look_through"
@@ -97,7 +98,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
     bl_options = {"UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require that the last capture has a camera and is not hidden."""
         if is_side_view(context):
             return refuse(cls, "Use this in the viewport with the footage")
@@ -116,7 +117,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
             )
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Set the scene's camera and resolution, and the viewport's view."""
         shown = context.scene.scope.result.collection
         camera = camera_of(context.scene)
@@ -137,7 +138,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_OT_compare_view(bpy.types.Operator):
+class SCOPE_OT_compare_view(Operator):
     """Show the body over the footage of this camera. Sets the scene's camera and resolution"""
 
     bl_idname = "scope.compare_view"
@@ -147,11 +148,11 @@ class SCOPE_OT_compare_view(bpy.types.Operator):
     index: IntProperty(name="Camera", min=0)
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require several cameras."""
         return len(cameras_of(context.scene)) > 1
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Set the scene's camera and resolution, and what the viewport shows."""
         scene = context.scene
         cameras = cameras_of(scene)
@@ -167,26 +168,26 @@ class SCOPE_OT_compare_view(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _is_shown(collection: bpy.types.Collection, layer: bpy.types.LayerCollection) -> bool:
+def _is_shown(collection: Collection, layer: bpy.types.LayerCollection) -> bool:
     """Return whether a collection is visible in this layer collection or in one below it."""
     here = layer.collection == collection and layer.is_visible
     return here or any(_is_shown(collection, child) for child in layer.children)
 
 
-class SCOPE_OT_side_view(bpy.types.Operator):
+class SCOPE_OT_side_view(Operator):
     """Show the captured body from its side in a second viewport, beside the one with the footage"""
 
     bl_idname = "scope.side_view"
     bl_label = "Side View"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a viewport that compares a capture with its footage."""
         if not is_looking_through(context):
             return refuse(cls, "Compare with Footage first")
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Open the second viewport, or close it."""
         side = comparison.side_area(context.window.screen)
         if side is None:
@@ -196,7 +197,7 @@ class SCOPE_OT_side_view(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_OT_go_to_frame(bpy.types.Operator):
+class SCOPE_OT_go_to_frame(Operator):
     """Go to the frame that the warning is about"""
 
     bl_idname = "scope.go_to_frame"
@@ -205,7 +206,7 @@ class SCOPE_OT_go_to_frame(bpy.types.Operator):
 
     frame: IntProperty(name="Frame", description="Scene frame")
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Set the current frame."""
         context.scene.frame_set(self.frame)
         return {"FINISHED"}
@@ -219,13 +220,13 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
     bl_options = {"UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Require a capture."""
         if not context.scene.scope.result.footage:
             return refuse(cls, "The capture does not say where its footage is")
         return True
 
-    def work(self, context: bpy.types.Context) -> str:
+    def work(self, context: Context) -> str:
         """Add the strips."""
         from ..scene.footage_strip import (
             add_footage_strips,

@@ -16,12 +16,13 @@ from __future__ import annotations
 import math
 
 import bpy
+from bpy.types import Area, Context, Event, Region, Window
 
 TAB = "Scope"
 _DRAWN_AFTER_S = 0.3  # a sidebar knows its tabs only after it has been drawn
 
 
-def viewport_of(context: bpy.types.Context) -> bpy.types.Area | None:
+def viewport_of(context: Context) -> Area | None:
     """Return the context's viewport, or else, as in a menu at the top, the largest of its
     window.
     """
@@ -33,7 +34,7 @@ def viewport_of(context: bpy.types.Context) -> bpy.types.Area | None:
     return max(viewports, key=lambda each: each.width * each.height, default=None)
 
 
-def show_tab(context: bpy.types.Context) -> None:
+def show_tab(context: Context) -> None:
     """Open the tab in the context's viewport, or else in the largest of its window: it shows a
     capture's progress.
     """
@@ -53,7 +54,7 @@ def _choose_tab_later(pointer: int) -> None:
         found[1].tag_redraw()
 
 
-def _choose_tab(area: bpy.types.Area) -> bool:
+def _choose_tab(area: Area) -> bool:
     """Choose the tab in a viewport; False where Blender does not allow it, such as before the
     sidebar was drawn.
     """
@@ -65,11 +66,11 @@ def _choose_tab(area: bpy.types.Area) -> bool:
     return True
 
 
-def _sidebars(area: bpy.types.Area) -> list[bpy.types.Region]:
+def _sidebars(area: Area) -> list[Region]:
     return [region for region in area.regions if region.type == "UI"]
 
 
-def is_over_tab(window: bpy.types.Window, event: bpy.types.Event) -> bool:
+def is_over_tab(window: Window, event: Event) -> bool:
     """Return whether the mouse is over a sidebar of a 3D viewport that shows the tab Scope."""
     areas = [area for area in window.screen.areas if area.type == "VIEW_3D"]
     return any(
@@ -99,7 +100,7 @@ def redraw_sidebars_twice() -> None:
         bpy.app.timers.register(redraw_sidebars, first_interval=_DRAWN_AFTER_S)
 
 
-def viewports() -> list[tuple[bpy.types.Window, bpy.types.Area]]:
+def viewports() -> list[tuple[Window, Area]]:
     """Return the viewports of all windows, each with its window."""
     windows = bpy.context.window_manager.windows
     return [
@@ -110,12 +111,12 @@ def viewports() -> list[tuple[bpy.types.Window, bpy.types.Area]]:
     ]
 
 
-def main_region(area: bpy.types.Area) -> bpy.types.Region:
+def main_region(area: Area) -> Region:
     """Return the region of an area that is neither header nor sidebar; every area has one."""
     return next(region for region in area.regions if region.type == "WINDOW")
 
 
-def viewport_at(pointer: int) -> tuple[bpy.types.Window, bpy.types.Area] | None:
+def viewport_at(pointer: int) -> tuple[Window, Area] | None:
     """Return a viewport and its window; None once it was closed or became another editor.
 
     :param pointer: ``as_pointer`` of the viewport's area.
@@ -127,7 +128,7 @@ _ANGLES = [2 * math.pi * k / 20 for k in range(20)]
 _MOVES = ("MOUSEMOVE", "INBETWEEN_MOUSEMOVE")
 
 
-def region_at(pointer: int) -> tuple[bpy.types.Area, bpy.types.Region] | None:
+def region_at(pointer: int) -> tuple[Area, Region] | None:
     """Return the viewport at an address and its main region; see `viewport_at`."""
     found = viewport_at(pointer)
     return (found[1], main_region(found[1])) if found else None
@@ -173,7 +174,7 @@ class Pointer:
         """Begin before the first event."""
         self._moved_to: tuple[int, int] | None = None
 
-    def place(self, event: bpy.types.Event) -> tuple[int, int]:
+    def place(self, event: Event) -> tuple[int, int]:
         """Return where the mouse was at an event; every event of the tool has to be given, in their
         order.
         """

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import bpy
+from bpy.types import UILayout
 
 from ..machine_code.kernel_count import kernel_count
 from ..temporary import discard, new_folder
@@ -122,7 +123,7 @@ def stop() -> None:
         discard(folder)
 
 
-def draw(layout: bpy.types.UILayout) -> None:
+def draw(layout: UILayout) -> None:
     """Show the progress while the solver is being compiled."""
     if WarmUp.process is not None and (compiled := _files() - WarmUp.files_before) > 0:
         share = min(1.0, compiled / kernel_count())

@@ -13,8 +13,8 @@ Then the armature deforms bone i by exactly T_i · rest_i⁻¹, which is SMPL's 
 
 from __future__ import annotations
 
-import bpy
 import numpy as np
+from bpy.types import Action, Object
 
 from ....solver.body import Body
 from ....solver.rotations import quaternion_from_matrix
@@ -69,8 +69,8 @@ def pose_channels(
 
 
 def animate_armature(
-    armature: bpy.types.Object,
-    action: bpy.types.Action,
+    armature: Object,
+    action: Action,
     body: Body,
     motion: Motion,
     rest: RestPose,

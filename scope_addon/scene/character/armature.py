@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.types import Collection, Object
 
 from ....solver.body import Body
 from ...arrays import Float64Array, FloatArray
@@ -83,9 +84,7 @@ def _bone_tails(body: Body, joints: Float64Array, vertices: Float64Array) -> Flo
     return tails
 
 
-def build_armature(
-    name: str, body: Body, rest: RestPose, collection: bpy.types.Collection
-) -> bpy.types.Object:
+def build_armature(name: str, body: Body, rest: RestPose, collection: Collection) -> Object:
     """Create an armature object in ``collection`` whose pose bones rotate by quaternions.
 
     The collection must be in the active view layer, because bones can only be created in edit mode.
@@ -119,7 +118,7 @@ def build_armature(
     return obj
 
 
-def rest_orientations(armature: bpy.types.Object, body: Body) -> Float64Array:
+def rest_orientations(armature: Object, body: Body) -> Float64Array:
     """Return M_i (K+1, 3, 3): bone to armature space at rest, as stored by Blender,
     orthonormalized.
     """
@@ -135,9 +134,7 @@ def side_of(joint_name: str) -> str:
     return head if head in SIDES else "Middle"
 
 
-def show_bones(
-    armature: bpy.types.Object, body: Body, rest: RestPose, vertices: Float64Array
-) -> None:
+def show_bones(armature: Object, body: Body, rest: RestPose, vertices: Float64Array) -> None:
     """Give every bone the colour and collection of its side, and a ring around the surface that it
     moves.
 
@@ -208,7 +205,7 @@ def _color(bone: bpy.types.Bone, color: tuple[float, float, float]) -> None:
     )
 
 
-def _ring() -> bpy.types.Object:
+def _ring() -> Object:
     """Return a circle of radius 1 normal to the bone's y axis, shared by all captures in the
     file.
     """

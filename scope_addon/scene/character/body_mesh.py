@@ -15,6 +15,7 @@ from collections.abc import Container
 
 import bpy
 import numpy as np
+from bpy.types import Action, Collection, Key, Object
 
 from ....solver.body import Body
 from ...arrays import Float32Array, Float64Array, FloatArray, IndexArray
@@ -29,9 +30,7 @@ SLIDER_LIMIT = 10.0  # the limit of Blender's sliders
 MODES = ("keyed", "baked")
 
 
-def build_mesh(
-    name: str, body: Body, vertices: Float64Array, collection: bpy.types.Collection
-) -> bpy.types.Object:
+def build_mesh(name: str, body: Body, vertices: Float64Array, collection: Collection) -> Object:
     """Create a mesh object of the body with UVs and materials, at the world's origin.
 
     :param vertices: (V, 3) metres, world frame, at rest.
@@ -59,7 +58,7 @@ def build_mesh(
 
 
 def colour_faces(
-    mesh: bpy.types.Object, faces: IndexArray, name: str, color: tuple[float, float, float]
+    mesh: Object, faces: IndexArray, name: str, color: tuple[float, float, float]
 ) -> None:
     """Give some faces (n,) of a mesh a matte material of their own, of a linear RGB colour."""
     material = _material(name, np.array([*color, 1.0]))
@@ -82,7 +81,7 @@ def rest_vertices_world(
     return body.rest_vertices(betas) @ R_WORLD_MODEL.T + lift
 
 
-def skin_to_armature(mesh: bpy.types.Object, armature: bpy.types.Object, body: Body) -> None:
+def skin_to_armature(mesh: Object, armature: Object, body: Body) -> None:
     """Add vertex groups with the body's skin weights and a linear Armature modifier, and set the
     armature as parent.
     """
@@ -133,7 +132,7 @@ def shape_key_name(coefficient: int) -> str:
     return f"Shape{coefficient:03d}"
 
 
-def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: FloatArray) -> None:
+def add_shape_keys(mesh: Object, body: Body, betas: FloatArray) -> None:
     """Add ``Basis`` (the current mesh: β = 0) and one key per coefficient, each at its fitted
     value.
 
@@ -158,12 +157,7 @@ def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: FloatArray) -> Non
         key.value = float(beta)
 
 
-def key_shape(
-    mesh: bpy.types.Object,
-    action: bpy.types.Action,
-    betas: FloatArray,
-    frame: float,
-) -> Channels:
+def key_shape(mesh: Object, action: Action, betas: FloatArray, frame: float) -> Channels:
     """Key the shape coefficients at a scene frame, and return the channels of the mesh's shape
     keys.
 
@@ -176,7 +170,7 @@ def key_shape(
     return channels
 
 
-def mixed_vertices(mesh: bpy.types.Object, without: Container[str] = ()) -> Float32Array:
+def mixed_vertices(mesh: Object, without: Container[str] = ()) -> Float32Array:
     """Return the rest vertices (V, 3) at the current slider values: ``basis + Σ_p value_p (key_p −
     basis)``.
 
@@ -202,12 +196,12 @@ MOUTH_COLOR = (0.06, 0.01, 0.01)  # linear
 MOVES = 1e-3  # change of a weight from which an expression counts as moving
 
 
-def has_expression_keys(keys: bpy.types.Key) -> bool:
+def has_expression_keys(keys: Key) -> bool:
     """Return whether a mesh's shape keys contain those of the face."""
     return EXPRESSIONS[0] in keys.key_blocks
 
 
-def add_expression_keys(mesh: bpy.types.Object, body: Body) -> bool:
+def add_expression_keys(mesh: Object, body: Body) -> bool:
     """Add one key per expression, each at 0, and ``Basis`` if there is none, and make the inside of
     the mouth dark.
 
@@ -228,7 +222,7 @@ def add_expression_keys(mesh: bpy.types.Object, body: Body) -> bool:
 
 
 def key_expressions(
-    mesh: bpy.types.Object,
+    mesh: Object,
     channels: Channels,
     motion: Motion,
     frames: Float64Array,
@@ -255,7 +249,7 @@ def key_expressions(
             channels.write(path, at[:1], values[:1], "CONSTANT", group="Face")
 
 
-def expression_offsets(mesh: bpy.types.Object) -> dict[str, Float32Array]:
+def expression_offsets(mesh: Object) -> dict[str, Float32Array]:
     """Return how far each expression's key moves the vertices (V, 3), by name; none if there are no
     such keys.
     """
@@ -264,9 +258,7 @@ def expression_offsets(mesh: bpy.types.Object) -> dict[str, Float32Array]:
     return {name: key_vertices(blocks[name]) - basis for name in EXPRESSIONS if name in blocks}
 
 
-def copy_expressions(
-    mesh: bpy.types.Object, source: bpy.types.Key, offsets: dict[str, Float32Array]
-) -> None:
+def copy_expressions(mesh: Object, source: Key, offsets: dict[str, Float32Array]) -> None:
     """Give a mesh without shape keys those of another one's expressions, with their keyframes.
 
     :param source: the other mesh's shape keys.
@@ -284,7 +276,7 @@ def copy_expressions(
                 channels.write(curve.data_path, keys[:, 0], keys[:, 1])
 
 
-def _add_key(mesh: bpy.types.Object, name: str, places: Float32Array, value: float) -> None:
+def _add_key(mesh: Object, name: str, places: Float32Array, value: float) -> None:
     """Add a shape key that has the vertices at ``places`` (V, 3)."""
     key = mesh.shape_key_add(name=name, from_mix=False)
     key.data.foreach_set("co", places.ravel())

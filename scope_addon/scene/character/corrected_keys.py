@@ -16,8 +16,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import bpy
 import numpy as np
+from bpy.types import Object
 
 from ....solver.body import Body
 from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
@@ -61,7 +61,7 @@ _SAME_M = 0.0005
 
 
 def rewrite_changed_keys(
-    armature: bpy.types.Object,
+    armature: Object,
     body: Body,
     rate: float,
     before: Motion,
@@ -140,11 +140,7 @@ def rewrite_changed_keys(
 
 
 def _with_raised_keys(
-    armature: bpy.types.Object,
-    body: Body,
-    clip: Clip,
-    frames: Float64Array,
-    rises: Float64Array,
+    armature: Object, body: Body, clip: Clip, frames: Float64Array, rises: Float64Array
 ) -> Clip:
     """Raise keys by vectors (T, 3), metres, and return their clip."""
     raised = Clip(clip.times, clip.rotations, clip.root + rises)
@@ -153,7 +149,7 @@ def _with_raised_keys(
 
 
 def pinned_places(
-    armature: bpy.types.Object, body: Body, rate: float, motion: Motion
+    armature: Object, body: Body, rate: float, motion: Motion
 ) -> dict[Pin, Float64Array]:
     """Return where the keys have each pinned joint in its frame, (3,) metres in the world of the
     capture.
@@ -173,9 +169,7 @@ def pinned_places(
     return {pin: joints[k, list(body.joint_names).index(pin.joint)] for k, pin in enumerate(pins)}
 
 
-def _meet_pin(
-    armature: bpy.types.Object, body: Body, rate: float, motion: Motion, pin: Pin
-) -> None:
+def _meet_pin(armature: Object, body: Body, rate: float, motion: Motion, pin: Pin) -> None:
     """Correct the keys by one more pin, if edited keys do not meet it although the motion does.
 
     :param rate: scene frames per second.
@@ -195,7 +189,7 @@ def _meet_pin(
 
 
 def heights_of_foot(
-    armature: bpy.types.Object, body: Body, rate: float, motion: Motion, frame: int, foot: str
+    armature: Object, body: Body, rate: float, motion: Motion, frame: int, foot: str
 ) -> tuple[float, float]:
     """Return how high a foot is in a frame, metres: in the motion, as smooth as the keys are, and
     in the edited keys.
@@ -213,9 +207,7 @@ def heights_of_foot(
     )
 
 
-def captured_points(
-    armature: bpy.types.Object, frame: float, points_world: Float64Array
-) -> Float64Array:
+def captured_points(armature: Object, frame: float, points_world: Float64Array) -> Float64Array:
     """Convert points of the scene (N, 3) at the current frame to the world of the capture, (N, 3)
     metres.
     """
@@ -226,7 +218,7 @@ def captured_points(
     return clip_with_root_motion(armature, still, np.full(n, frame)).root
 
 
-def source_frame(armature: bpy.types.Object, motion: Motion, frame: float, rate: float) -> int:
+def source_frame(armature: Object, motion: Motion, frame: float, rate: float) -> int:
     """Return the footage's frame that is shown at a scene frame.
 
     :raises UsageError: the motion has none there, or its keys were moved.
@@ -250,9 +242,7 @@ def source_frame(armature: bpy.types.Object, motion: Motion, frame: float, rate:
     return int(motion.frames[row])
 
 
-def frames_that_show(
-    armature: bpy.types.Object, motion: Motion, frame: int, rate: float
-) -> tuple[int, int]:
+def frames_that_show(armature: Object, motion: Motion, frame: int, rate: float) -> tuple[int, int]:
     """Return the first and the last whole scene frame at which a frame of the footage is shown; if
     there is none, twice the nearest one.
 
@@ -287,7 +277,7 @@ def _longest_shown(motion: Motion, rate: float) -> float:
     return max(spacing, 1.0 / rate)
 
 
-def check_times_of_keys(armature: bpy.types.Object, motion: Motion, rate: float) -> None:
+def check_times_of_keys(armature: Object, motion: Motion, rate: float) -> None:
     """Check that the keys are at the times of the captured motion, or of the loop made from it.
 
     There may be fewer keys, if they were reduced, baked or deleted, and further ones may have been
@@ -319,11 +309,7 @@ def check_times_of_keys(armature: bpy.types.Object, motion: Motion, rate: float)
 
 
 def _are_moved(
-    frames: Float64Array,
-    captured: Float64Array,
-    first: float,
-    last: float,
-    rounded: float,
+    frames: Float64Array, captured: Float64Array, first: float, last: float, rounded: float
 ) -> bool:
     """Return whether keys were moved or stretched in time.
 
@@ -361,7 +347,7 @@ def _are_later(frames: Float64Array, first: float, last: float, rounded: float) 
     return len(after) > _ADDED_POSES or bool(is_shifted_end.any())
 
 
-def whole_span(armature: bpy.types.Object, motion: Motion, rate: float) -> tuple[int, int]:
+def whole_span(armature: Object, motion: Motion, rate: float) -> tuple[int, int]:
     """Return the first and the last scene frame of a motion, rounded outwards to whole frames.
 
     :param rate: scene frames per second.
@@ -371,12 +357,12 @@ def whole_span(armature: bpy.types.Object, motion: Motion, rate: float) -> tuple
     return math.floor(first + _WHOLE), math.ceil(last - _WHOLE)
 
 
-def scene_frame(armature: bpy.types.Object, motion: Motion, frame: int, rate: float) -> float:
+def scene_frame(armature: Object, motion: Motion, frame: int, rate: float) -> float:
     """Return the scene frame at which a frame of the footage is shown."""
     return float(np.interp(frame, motion.frames, motion.timestamps) * rate + start_frame(armature))
 
 
-def _start(armature: bpy.types.Object, rate: float) -> float:
+def _start(armature: Object, rate: float) -> float:
     """Return the scene's time in seconds at the footage's time 0."""
     return start_frame(armature) / rate
 
@@ -394,7 +380,7 @@ def _at(clip: Clip, times: Float64Array, start: float) -> Clip:
 
 
 def _check_root_motion(
-    armature: bpy.types.Object, was: Float64Array | None, now: Float64Array | None
+    armature: Object, was: Float64Array | None, now: Float64Array | None
 ) -> None:
     """Refuse to turn the world of keys whose root motion is on an object.
 
@@ -422,7 +408,7 @@ def _moves(again: BoolArray, was: Float64Array | None, now: Float64Array | None)
 
 
 def _write_change(
-    armature: bpy.types.Object,
+    armature: Object,
     body: Body,
     clip: Clip,
     frames: Float64Array,
@@ -471,11 +457,7 @@ class KeyEdits:
 
 
 def begin_with_edits(
-    armature: bpy.types.Object,
-    body: Body,
-    clips: tuple[Clip, Clip],
-    frames: Float64Array,
-    edits: KeyEdits,
+    armature: Object, body: Body, clips: tuple[Clip, Clip], frames: Float64Array, edits: KeyEdits
 ) -> tuple[Clip, Clip]:
     """Edit keys, and the clip that they are compared with.
 
@@ -510,9 +492,7 @@ def begin_with_edits(
     return _replaced(keys, edits.rows, placed), _replaced(old, edits.rows, compared)
 
 
-def meet_floor(
-    armature: bpy.types.Object, body: Body, rate: float, motion: Motion, edits: KeyEdits
-) -> None:
+def meet_floor(armature: Object, body: Body, rate: float, motion: Motion, edits: KeyEdits) -> None:
     """Put feet on the floor whose keys were edited, if they are not there although those of the
     motion are.
 
@@ -529,7 +509,7 @@ def meet_floor(
 
 
 def floored(
-    armature: bpy.types.Object,
+    armature: Object,
     body: Body,
     betas: FloatArray,
     clip: Clip,

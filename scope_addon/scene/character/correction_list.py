@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import bpy
+from bpy.types import Object
 
 from ..stored_values import LAST_FRAME
 
@@ -22,7 +22,7 @@ _MISSED_M = 0.01
 _ENTRY = {"kind": str, "text": str, "joint": str, "first": int, "last": int}
 
 
-def listed_corrections(armature: bpy.types.Object) -> list[dict[str, Any]]:
+def listed_corrections(armature: Object) -> list[dict[str, Any]]:
     """Return the corrections in their order: ``kind``, ``text``, ``joint``, scene frames ``first``
     and ``last``.
 
@@ -52,10 +52,7 @@ def _is_entry(value: object) -> bool:
 
 
 def store_corrections(
-    armature: bpy.types.Object,
-    motion: Motion,
-    rate: float,
-    places: dict[Pin, Float64Array] | None = None,
+    armature: Object, motion: Motion, rate: float, places: dict[Pin, Float64Array] | None = None
 ) -> None:
     """Store the list of a motion's corrections with its armature.
 
@@ -77,9 +74,7 @@ def store_corrections(
     armature[_LIST] = json.dumps(entries)
 
 
-def _entry(
-    armature: bpy.types.Object, motion: Motion, correction: Correction, rate: float
-) -> dict[str, Any]:
+def _entry(armature: Object, motion: Motion, correction: Correction, rate: float) -> dict[str, Any]:
     """Describe a correction."""
     from ...edit.corrections import FeetOnFloor, Floor, Pin, Upright
     from .corrected_keys import frames_that_show, scene_frame

@@ -15,8 +15,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import bpy
 import numpy as np
+from bpy.types import FCurve, Object
 
 from ....solver.body import Body
 from ....solver.rotations import matrix_from_quaternion
@@ -42,7 +42,7 @@ ROTATION = "rotation_quaternion"
 LOCATION = "location"
 
 
-def read_clip(armature: bpy.types.Object, body: Body, rate: float) -> tuple[Clip, Float64Array]:
+def read_clip(armature: Object, body: Body, rate: float) -> tuple[Clip, Float64Array]:
     """Read the motion from the keys.
 
     If curves have keys at different frames, every frame with a key on any curve is included.
@@ -58,7 +58,7 @@ def read_clip(armature: bpy.types.Object, body: Body, rate: float) -> tuple[Clip
     return read_clip_at(armature, body, rate, frames), frames
 
 
-def read_clip_at(armature: bpy.types.Object, body: Body, rate: float, frames: Float64Array) -> Clip:
+def read_clip_at(armature: Object, body: Body, rate: float, frames: Float64Array) -> Clip:
     """Read the motion at scene frames (T,), as interpolated by Blender.
 
     :param rate: scene frames per second.
@@ -78,9 +78,7 @@ def read_clip_at(armature: bpy.types.Object, body: Body, rate: float, frames: Fl
     return Clip(frames / rate, rotations, pelvis)
 
 
-def channel_values(
-    armature: bpy.types.Object, body: Body, clip: Clip
-) -> tuple[Float64Array, Float64Array]:
+def channel_values(armature: Object, body: Body, clip: Clip) -> tuple[Float64Array, Float64Array]:
     """Compute Blender's channels of a clip.
 
     :return: quaternions (T, K+1, 4) on one hemisphere; root locations (T, 3) in the armature's
@@ -93,7 +91,7 @@ def channel_values(
     return continuous_quaternions(B), clip.root - _root_head(armature, body)
 
 
-def write_clip(armature: bpy.types.Object, body: Body, clip: Clip, frames: Float64Array) -> None:
+def write_clip(armature: Object, body: Body, clip: Clip, frames: Float64Array) -> None:
     """Replace the keys of all bones by the clip's, at scene frames (T,); curves, groups and action
     are kept.
 
@@ -107,11 +105,7 @@ def write_clip(armature: bpy.types.Object, body: Body, clip: Clip, frames: Float
 
 
 def write_keys(
-    armature: bpy.types.Object,
-    body: Body,
-    clip: Clip,
-    frames: Float64Array,
-    which: BoolArray,
+    armature: Object, body: Body, clip: Clip, frames: Float64Array, which: BoolArray
 ) -> None:
     """Replace only some keys by the clip's; a curve that has no key at one of these frames gets
     one.
@@ -132,7 +126,7 @@ def write_keys(
             change_keys(curve, frames[which], new[which, index])
 
 
-def bake_whole_frames(armature: bpy.types.Object, body: Body, rate: float) -> tuple[int, int]:
+def bake_whole_frames(armature: Object, body: Body, rate: float) -> tuple[int, int]:
     """Replace the keys by one on every whole frame of the scene, with a low-pass filter against
     aliasing.
 
@@ -159,12 +153,7 @@ class Reduction:
 
 
 def reduce_keys(
-    armature: bpy.types.Object,
-    body: Body,
-    betas: FloatArray,
-    rate: float,
-    angle: float,
-    distance: float,
+    armature: Object, body: Body, betas: FloatArray, rate: float, angle: float, distance: float
 ) -> Reduction:
     """Remove the keys that linear interpolation does not need, separately for each bone.
 
@@ -193,7 +182,7 @@ def reduce_keys(
     return Reduction(before, after, float(off.max()), float(moved.max()))
 
 
-def channel_curves(armature: bpy.types.Object, body: Body) -> list[bpy.types.FCurve]:
+def channel_curves(armature: Object, body: Body) -> list[FCurve]:
     """Return the curves of all bones' rotations and of the root's location, always in the same
     order.
 
@@ -213,19 +202,19 @@ def _values_by_path(body: Body, q: Float64Array, location: Float64Array) -> dict
     return rotations | {location_path(body): location}
 
 
-def _root_head(armature: bpy.types.Object, body: Body) -> Float64Array:
+def _root_head(armature: Object, body: Body) -> Float64Array:
     """Return h_0 (3,)."""
     return np.array(armature.data.bones[body.joint_names[0]].head_local)
 
 
-def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.FCurve]]:
+def _curves(armature: Object, body: Body) -> dict[str, list[FCurve]]:
     """Return the curves of every bone's rotation and the root's location by data path, in the order
     of their index.
     """
     _check_bones(armature, body)
     check_not_moved_by_nla(armature)
     wanted = {bone_path(name, ROTATION): 4 for name in body.joint_names} | {location_path(body): 3}
-    found: dict[str, dict[int, bpy.types.FCurve]] = {path: {} for path in wanted}
+    found: dict[str, dict[int, FCurve]] = {path: {} for path in wanted}
     for curve in fcurves(armature):
         if curve.data_path in found and len(curve.keyframe_points):
             found[curve.data_path][curve.array_index] = curve
@@ -239,7 +228,7 @@ def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.
     return {path: [by_index[i] for i in sorted(by_index)] for path, by_index in found.items()}
 
 
-def _values(curve: bpy.types.FCurve, frames: Float64Array) -> Float64Array:
+def _values(curve: FCurve, frames: Float64Array) -> Float64Array:
     """Evaluate the curve's keys at frames (T,); if these are theirs, read them, which is much
     faster.
     """
@@ -249,7 +238,7 @@ def _values(curve: bpy.types.FCurve, frames: Float64Array) -> Float64Array:
     return values_between_keys(curve, frames)
 
 
-def _check_bones(armature: bpy.types.Object, body: Body) -> None:
+def _check_bones(armature: Object, body: Body) -> None:
     """Check that an armature has the body's bones, and that the keys that a capture has written
     rotate them.
 
@@ -272,7 +261,7 @@ def _check_bones(armature: bpy.types.Object, body: Body) -> None:
             )
 
 
-def _axes(armature: bpy.types.Object, body: Body) -> Float64Array:
+def _axes(armature: Object, body: Body) -> Float64Array:
     """Return C_i = M_iᵀ R_world_model (K+1, 3, 3)."""
     return transposed(rest_orientations(armature, body)) @ R_WORLD_MODEL
 

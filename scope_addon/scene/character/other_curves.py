@@ -14,8 +14,8 @@ toes (on the foot's) are at rest on the floor; drivers and constraints can use i
 
 from __future__ import annotations
 
-import bpy
 import numpy as np
+from bpy.types import FCurve, Object, Scene
 
 from ....solver.body import Body
 from ...arrays import BoolArray, Float64Array
@@ -66,7 +66,7 @@ _MAX_MARKERS = 40  # more would clutter the timeline
 _GAP_S = 0.5  # spans closer than this share a marker
 
 
-def cut_to_cycle(armature: bpy.types.Object, body: Body, first: float, last: float) -> None:
+def cut_to_cycle(armature: Object, body: Body, first: float, last: float) -> None:
     """Cut the curves to scene frames, with a key at both ends; a curve of one key has it at the
     first.
     """
@@ -84,7 +84,7 @@ def cut_to_cycle(armature: bpy.types.Object, body: Body, first: float, last: flo
 
 
 def restore_whole_motion(
-    armature: bpy.types.Object, body: Body, motion: Motion, frames: Float64Array
+    armature: Object, body: Body, motion: Motion, frames: Float64Array
 ) -> None:
     """Give the curves the keys of the whole captured motion again, at scene frames (T,).
 
@@ -114,18 +114,14 @@ def restore_whole_motion(
         rewrite_keys(curve, frames[known], np.asarray(column)[known], interpolation)
 
 
-def _curves(armature: bpy.types.Object) -> list[bpy.types.FCurve]:
+def _curves(armature: Object) -> list[FCurve]:
     """Return the curves of an armature and of its meshes' shape keys that this file may change."""
     blocks = [armature, *shape_keys_of(armature)]
     return [curve for block in blocks if block.library is None for curve in fcurves(block)]
 
 
 def key_measurements(
-    armature: bpy.types.Object,
-    channels: Channels,
-    body: Body,
-    motion: Motion,
-    frames: Float64Array,
+    armature: Object, channels: Channels, body: Body, motion: Motion, frames: Float64Array
 ) -> None:
     """Key confidence, standard deviation and contact as custom properties of the bones, at scene
     frames (T,).
@@ -179,11 +175,7 @@ def measurements_of(body: Body, motion: Motion) -> dict[tuple[str, str], Float64
 
 
 def exchange_measurements(
-    armature: bpy.types.Object,
-    body: Body,
-    before: Motion,
-    after: Motion,
-    frames: Float64Array,
+    armature: Object, body: Body, before: Motion, after: Motion, frames: Float64Array
 ) -> None:
     """Change the keys of measurements where another correction exchanges left and right, so that
     the foot that rests in the user's eyes has the contact.
@@ -217,7 +209,7 @@ def _known_values_at(at: Float64Array, frames: Float64Array, values: Float64Arra
 
 
 def add_review_markers(
-    scene: bpy.types.Scene,
+    scene: Scene,
     prefix: str,
     motion: Motion,
     frames: Float64Array,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from bpy.types import Object
 from mathutils import Matrix
 
 from ....solver.body import Body
@@ -43,7 +44,7 @@ _RIGID = 1e-3  # by how much the determinant of a rigid transform may differ fro
 _PLACE = "scope_place"
 
 
-def topmost(armature: bpy.types.Object) -> bpy.types.Object:
+def topmost(armature: Object) -> Object:
     """Return the armature, or the topmost of its parents below the root object: the child of the
     root object.
     """
@@ -53,20 +54,20 @@ def topmost(armature: bpy.types.Object) -> bpy.types.Object:
     return obj
 
 
-def root_object(armature: bpy.types.Object) -> bpy.types.Object | None:
+def root_object(armature: Object) -> Object | None:
     """Return the empty with the armature's root motion, or None."""
     return topmost(armature).parent
 
 
 def parent_to_root_object(
-    armature: bpy.types.Object,
+    armature: Object,
     frames: Float64Array,
     positions: Float64Array,
     angles: Float64Array,
     *,
     in_place: bool = False,
     below_parent: bool = False,
-) -> bpy.types.Object:
+) -> Object:
     """Parent the armature to a new empty that follows a trajectory, and replace a former root
     object.
 
@@ -121,7 +122,7 @@ def parent_to_root_object(
     return empty
 
 
-def remove_root_object(armature: bpy.types.Object) -> None:
+def remove_root_object(armature: Object) -> None:
     """Remove the root object; the armature gets its former transform and parent and keeps the
     motion of its bones.
 
@@ -138,7 +139,7 @@ def remove_root_object(armature: bpy.types.Object) -> None:
     _remove_unless_parent(empty)
 
 
-def parent_transform(obj: bpy.types.Object) -> Matrix:
+def parent_transform(obj: Object) -> Matrix:
     """Return the transform (4, 4) that an object inherits at the current frame; the identity
     without a parent.
     """
@@ -148,7 +149,7 @@ def parent_transform(obj: bpy.types.Object) -> Matrix:
 
 
 def move_root_motion_to_object(
-    armature: bpy.types.Object, body: Body, rate: float, *, in_place: bool, heading: bool
+    armature: Object, body: Body, rate: float, *, in_place: bool, heading: bool
 ) -> None:
     """Move the root motion from the bones to a root object.
 
@@ -191,7 +192,7 @@ def move_root_motion_to_object(
         repeat_root_object(empty)
 
 
-def check_own_action(armature: bpy.types.Object) -> None:
+def check_own_action(armature: Object) -> None:
     """Check that no other object, such as a linked duplicate, has the same keys: it would lose or
     double the root motion that they lose or get.
 
@@ -212,7 +213,7 @@ def check_own_action(armature: bpy.types.Object) -> None:
             )
 
 
-def _check_own_transform(armature: bpy.types.Object) -> None:
+def _check_own_transform(armature: Object) -> None:
     """Check that an armature's own transform does not move, as the trajectory would have it twice.
 
     :raises UsageError: keys, drivers or constraints move it.
@@ -224,7 +225,7 @@ def _check_own_transform(armature: bpy.types.Object) -> None:
         )
 
 
-def moved_by(obj: bpy.types.Object) -> list[str]:
+def moved_by(obj: Object) -> list[str]:
     """Return the properties by whose keys or drivers an object itself moves, and its
     constraints.
     """
@@ -238,14 +239,14 @@ def moved_by(obj: bpy.types.Object) -> list[str]:
     return moving + [each.name for each in obj.constraints if not each.mute]
 
 
-def repeat_root_object(empty: bpy.types.Object) -> None:
+def repeat_root_object(empty: Object) -> None:
     """Repeat the trajectory of a root object whose armature repeats: each cycle goes on where the
     one before it ended.
     """
     add_cycles(empty, offset_curves={("location", 0), ("location", 1)})
 
 
-def move_root_motion_to_bones(armature: bpy.types.Object, body: Body, rate: float) -> None:
+def move_root_motion_to_bones(armature: Object, body: Body, rate: float) -> None:
     """Move the root motion back to the bones and remove the root object. A trajectory not in use is
     restored too.
 
@@ -260,7 +261,7 @@ def move_root_motion_to_bones(armature: bpy.types.Object, body: Body, rate: floa
     remove_root_object(armature)
 
 
-def clip_with_root_motion(armature: bpy.types.Object, clip: Clip, frames: Float64Array) -> Clip:
+def clip_with_root_motion(armature: Object, clip: Clip, frames: Float64Array) -> Clip:
     """Return the clip including the trajectory stored in its root object, in use or not, in the
     armature's own space.
 
@@ -275,7 +276,7 @@ def clip_with_root_motion(armature: bpy.types.Object, clip: Clip, frames: Float6
 
 
 def removed_root_motion(
-    armature: bpy.types.Object, frames: Float64Array
+    armature: Object, frames: Float64Array
 ) -> tuple[Float64Array, Float64Array]:
     """Return the trajectory stored in the root object, in use or not; zeros without a root object.
 
@@ -300,14 +301,14 @@ def removed_root_motion(
     return positions / armature.matrix_basis.median_scale, angle
 
 
-def retime_unused_trajectory(empty: bpy.types.Object, retiming: Retiming) -> None:
+def retime_unused_trajectory(empty: Object, retiming: Retiming) -> None:
     """Move a trajectory in time that is stored but not in use."""
     if (rows := _unused_trajectory(empty)) is not None:
         rows[:, 0] = retiming.frames(rows[:, 0])
         empty[_UNUSED_TRAJECTORY] = rows.ravel().tolist()
 
 
-def _unused_trajectory(empty: bpy.types.Object) -> Float64Array | None:
+def _unused_trajectory(empty: Object) -> Float64Array | None:
     """Return frame, x, y and angle of a trajectory that is stored but not in use, (T, 4); None if
     there is none.
     """
@@ -316,7 +317,7 @@ def _unused_trajectory(empty: bpy.types.Object) -> Float64Array | None:
     return rows if 4 * len(rows) == len(numbers) > 0 and (np.diff(rows[:, 0]) > 0).all() else None
 
 
-def clip_as_displayed(armature: bpy.types.Object, clip: Clip, frames: Float64Array) -> Clip:
+def clip_as_displayed(armature: Object, clip: Clip, frames: Float64Array) -> Clip:
     """Return the clip as displayed: moved by its root object, whether animated or at rest.
 
     :param frames: (T,) scene frames of the clip's keys.
@@ -327,7 +328,7 @@ def clip_as_displayed(armature: bpy.types.Object, clip: Clip, frames: Float64Arr
 
 
 def _keyed_path(
-    armature: bpy.types.Object, empty: bpy.types.Object, frames: Float64Array
+    armature: Object, empty: Object, frames: Float64Array
 ) -> tuple[Float64Array, Float64Array]:
     """Return the empty's positions (T, 3), in the armature's units, and angles (T,), radians, at
     scene frames (T,).
@@ -350,14 +351,14 @@ def _keyed_path(
     ]
 
 
-def _place(empty: bpy.types.Object) -> Matrix:
+def _place(empty: Object) -> Matrix:
     """Return the armature's rigid transform before its root motion was moved."""
     numbers = stored_numbers(empty, _PLACE)
     place = Matrix([numbers[k : k + 4] for k in (0, 4, 8, 12)]) if len(numbers) == 16 else Matrix()
     return place if abs(place.determinant() - 1.0) < _RIGID else Matrix()
 
 
-def _place_now(empty: bpy.types.Object) -> Matrix:
+def _place_now(empty: Object) -> Matrix:
     """Return the transform that the armature gets back: that of `_place`, moved over the floor like
     an empty at rest since its trajectory was stored.
     """
@@ -378,7 +379,7 @@ def _moved(clip: Clip, place: Matrix, size: float) -> Clip:
     return moved_clip(clip, transform)
 
 
-def _copy_parenting(obj: bpy.types.Object, other: bpy.types.Object) -> None:
+def _copy_parenting(obj: Object, other: Object) -> None:
     """Give an object the parent of another one, with the same kind of parenting."""
     obj.parent = other.parent
     obj.matrix_parent_inverse.identity()
@@ -389,7 +390,7 @@ def _copy_parenting(obj: bpy.types.Object, other: bpy.types.Object) -> None:
         obj.matrix_parent_inverse = other.matrix_parent_inverse
 
 
-def _remove_unless_parent(empty: bpy.types.Object) -> None:
+def _remove_unless_parent(empty: Object) -> None:
     if empty.children:
         return
     action = action_of(empty)

@@ -13,8 +13,8 @@ import io
 from dataclasses import dataclass
 from pathlib import Path
 
-import bpy
 import numpy as np
+from bpy.types import Object
 
 from ....solver.body import Body
 from ...arrays import BoolArray, Float32Array, Float64Array
@@ -70,7 +70,7 @@ class UncorrectedKeys:
         return UncorrectedKeys(times, before.astype(np.float32), written.astype(np.float32), rise)
 
 
-def keyed_values(armature: bpy.types.Object, body: Body, frames: Float32Array) -> Float32Array:
+def keyed_values(armature: Object, body: Body, frames: Float32Array) -> Float32Array:
     """Return the keys' values (T, C) at scene frames (T,); NaN where a curve has no key."""
     curves = channel_curves(armature, body)
     out = np.full((len(frames), len(curves)), np.nan, np.float32)
@@ -83,7 +83,7 @@ def keyed_values(armature: bpy.types.Object, body: Body, frames: Float32Array) -
 
 
 def restore(
-    armature: bpy.types.Object, body: Body, start: float, rate: float, known: UncorrectedKeys
+    armature: Object, body: Body, start: float, rate: float, known: UncorrectedKeys
 ) -> set[int]:
     """Give the rows that are as the corrections wrote them the keys from before; remove keys that
     were added.
@@ -114,12 +114,7 @@ def restore(
 
 
 def write_both(
-    armature: bpy.types.Object,
-    body: Body,
-    free: Clip,
-    corrected: Clip,
-    frames: Float64Array,
-    rate: float,
+    armature: Object, body: Body, free: Clip, corrected: Clip, frames: Float64Array, rate: float
 ) -> UncorrectedKeys:
     """Replace all keys by those of a corrected clip, at scene frames (T,).
 

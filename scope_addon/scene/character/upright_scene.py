@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import json
 
-import bpy
 import numpy as np
+from bpy.types import FCurve, Object
 from mathutils import Matrix, Quaternion
 
 from ...arrays import Float64Array
@@ -21,11 +21,7 @@ _LARGEST = 1e9  # of its numbers
 
 
 def turn_camera(
-    camera: bpy.types.Object,
-    armature: bpy.types.Object,
-    transform: Float64Array,
-    *,
-    to_captured: bool,
+    camera: Object, armature: Object, transform: Float64Array, *, to_captured: bool
 ) -> None:
     """Move the capture's camera together with a person; where it was at first if it was not moved
     since.
@@ -51,7 +47,7 @@ def turn_camera(
         camera[_TURNED] = json.dumps([before, _place(camera)])
 
 
-def _place(camera: bpy.types.Object) -> list[list[float]]:
+def _place(camera: Object) -> list[list[float]]:
     """Return the camera's keys, or without keys its own transform, as exact numbers."""
     keys = _curves(camera)
     own = [*camera.location, *camera.rotation_quaternion, *camera.rotation_euler, *camera.scale]
@@ -76,7 +72,7 @@ def _is_like(place: object, now: list[list[float]]) -> bool:
     )
 
 
-def _put(camera: bpy.types.Object, place: list[list[float]]) -> None:
+def _put(camera: Object, place: list[list[float]]) -> None:
     """Put the camera where ``_place`` found it."""
     if own := place[0]:
         camera.location = own[:3]
@@ -88,14 +84,12 @@ def _put(camera: bpy.types.Object, place: list[list[float]]) -> None:
         rewrite_keys(curve, frames, numbers)
 
 
-def _curves(camera: bpy.types.Object) -> list[bpy.types.FCurve]:
+def _curves(camera: Object) -> list[FCurve]:
     """Return the curves of a camera's place."""
     return [c for c in fcurves(camera) if c.data_path in ("location", "rotation_quaternion")]
 
 
-def move_camera(
-    camera: bpy.types.Object, armature: bpy.types.Object, transform: Float64Array
-) -> None:
+def move_camera(camera: Object, armature: Object, transform: Float64Array) -> None:
     """Move the capture's camera, with its keys, together with a person.
 
     :param transform: (4, 4) rigid, of the captured world, in which the armature's keys are.

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
+from bpy.types import Collection, Object
 
 from ....solver.body import Body
 from ...atomic_write import atomic_path, reason
@@ -85,7 +86,7 @@ class ExportOptions:
 
 def export(
     path: str | Path,
-    collections: Sequence[bpy.types.Collection] | None = None,
+    collections: Sequence[Collection] | None = None,
     options: ExportOptions | None = None,
 ) -> list[Path]:
     """Write captures in the format of the suffix, to one file, or one per person for .bvh and on
@@ -128,10 +129,7 @@ def export(
 
 
 def _write_one(
-    path: Path,
-    collections: Sequence[bpy.types.Collection],
-    rigs: Sequence[bpy.types.Object],
-    options: ExportOptions,
+    path: Path, collections: Sequence[Collection], rigs: Sequence[Object], options: ExportOptions
 ) -> None:
     """Write these collections over the frame range of all ``rigs``, so that separate files start at
     the same time.
@@ -272,7 +270,7 @@ def _reason(error: RuntimeError | OSError) -> str:
 
 
 @contextmanager
-def renamed_bones(rigs: Sequence[bpy.types.Object], skeleton: str) -> Iterator[None]:
+def renamed_bones(rigs: Sequence[Object], skeleton: str) -> Iterator[None]:
     """Give the bones of captured people the names of a skeleton inside the block; vertex groups and
     keys follow.
     """

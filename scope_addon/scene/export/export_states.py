@@ -11,6 +11,7 @@ from contextlib import contextmanager
 
 import bpy
 import numpy as np
+from bpy.types import Collection, Mesh, Object, Scene
 from mathutils import Matrix
 
 from ...errors import UsageError
@@ -29,7 +30,7 @@ from ..visibility import window_shows, world_matrix
 
 
 @contextmanager
-def temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
+def temporary_scene(name: str) -> Iterator[Scene]:
     """Provide an empty scene that is the window's active scene inside the block, and remove it
     afterwards.
     """
@@ -43,11 +44,8 @@ def temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
 
 @contextmanager
 def scene_of(
-    collections: Sequence[bpy.types.Collection],
-    rigs: Sequence[bpy.types.Object],
-    with_camera: bool,
-    unit: float = 1.0,
-) -> Iterator[bpy.types.Scene]:
+    collections: Sequence[Collection], rigs: Sequence[Object], with_camera: bool, unit: float = 1.0
+) -> Iterator[Scene]:
     """Provide a scene that contains only these collections, with the frame rate and resolution of
     the active scene.
 
@@ -90,7 +88,7 @@ def scene_of(
     source.frame_set(source.frame_current, subframe=source.frame_subframe)
 
 
-def unit_of_captures(rigs: Sequence[bpy.types.Object], unit: float) -> float:
+def unit_of_captures(rigs: Sequence[Object], unit: float) -> float:
     """Return the metres that a length of 1 stands for in captures, which are built in metres in any
     scene.
 
@@ -104,7 +102,7 @@ def unit_of_captures(rigs: Sequence[bpy.types.Object], unit: float) -> float:
 
 
 @contextmanager
-def external_parents_replaced(scene: bpy.types.Scene) -> Iterator[None]:
+def external_parents_replaced(scene: Scene) -> Iterator[None]:
     """Replace parents outside the scene by empties with the same motion.
 
     Exporting the parents themselves would include all their other children.
@@ -152,7 +150,7 @@ def external_parents_replaced(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 @contextmanager
-def scaled(scene: bpy.types.Scene, size: float) -> Iterator[None]:
+def scaled(scene: Scene, size: float) -> Iterator[None]:
     """Parent everything in a scene to an empty of a size inside the block; no object has a parent
     outside the scene.
     """
@@ -173,7 +171,7 @@ def scaled(scene: bpy.types.Scene, size: float) -> Iterator[None]:
 
 
 @contextmanager
-def out_of_edit_mode(collections: Sequence[bpy.types.Collection]) -> Iterator[None]:
+def out_of_edit_mode(collections: Sequence[Collection]) -> Iterator[None]:
     """Leave Edit Mode inside the block if an object in these collections is edited; the edits would
     not be written.
     """
@@ -188,7 +186,7 @@ def out_of_edit_mode(collections: Sequence[bpy.types.Collection]) -> Iterator[No
 
 
 @contextmanager
-def all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None]:
+def all_evaluated(collections: Sequence[Collection]) -> Iterator[None]:
     """Show all objects in these collections and leave Rest Position inside the block.
 
     Some exporters ignore the animation of objects hidden in viewports or renders, or in Rest
@@ -208,7 +206,7 @@ def all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None]
 
 
 @contextmanager
-def in_position(objects: Iterable[bpy.types.Object], position: str) -> Iterator[None]:
+def in_position(objects: Iterable[Object], position: str) -> Iterator[None]:
     """Show the armatures among the objects in ``POSE`` or ``REST`` position inside the block."""
     armatures = {obj.data for obj in objects if obj.type == "ARMATURE"}
     with changed(armatures, pose_position=position):
@@ -216,7 +214,7 @@ def in_position(objects: Iterable[bpy.types.Object], position: str) -> Iterator[
 
 
 @contextmanager
-def actions_over_scene_range(scene: bpy.types.Scene) -> Iterator[None]:
+def actions_over_scene_range(scene: Scene) -> Iterator[None]:
     """Set the frame range of armatures' actions to that of the scene.
 
     A person who appears late then does so in a separate file too, and exporters include keys
@@ -235,7 +233,7 @@ def actions_over_scene_range(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 @contextmanager
-def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
+def baked_meshes(scene: Scene) -> Iterator[None]:
     """Replace captured bodies by meshes of their current shape inside the block; expressions stay
     keys.
 
@@ -261,7 +259,7 @@ def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 @contextmanager
-def replaced_meshes(new: Mapping[bpy.types.Object, bpy.types.Mesh]) -> Iterator[None]:
+def replaced_meshes(new: Mapping[Object, Mesh]) -> Iterator[None]:
     """Give objects new meshes under the names of theirs inside the block, and remove these after
     it.
     """
@@ -284,11 +282,8 @@ def replaced_meshes(new: Mapping[bpy.types.Object, bpy.types.Mesh]) -> Iterator[
 
 @contextmanager
 def one_person(
-    rig: bpy.types.Object,
-    rigs: Sequence[bpy.types.Object],
-    collections: Sequence[bpy.types.Collection],
-    name: str,
-) -> Iterator[list[bpy.types.Collection]]:
+    rig: Object, rigs: Sequence[Object], collections: Sequence[Collection], name: str
+) -> Iterator[list[Collection]]:
     """Provide collections with the objects of one person inside the block: those of ``collections``
     without others'.
     """
@@ -308,7 +303,7 @@ def one_person(
         bpy.data.batch_remove(parts)
 
 
-def _rigs_of(obj: bpy.types.Object, rigs: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
+def _rigs_of(obj: Object, rigs: Sequence[Object]) -> list[Object]:
     """Return those of the rigs that deform an object, or else the one that it is or hangs from."""
     deforming = [rig for rig in rigs if is_deformed_by(obj, rig)]
     if deforming:

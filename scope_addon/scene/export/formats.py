@@ -38,6 +38,7 @@ from typing import Any
 import addon_utils
 import bpy
 import numpy as np
+from bpy.types import Object, Scene
 from mathutils import Matrix
 
 from ...errors import OutputError
@@ -178,7 +179,7 @@ def write_usd(path: Path, camera: bool = False) -> None:
         raise _incomplete(path)
 
 
-def write_blend(path: Path, scene: bpy.types.Scene) -> None:
+def write_blend(path: Path, scene: Scene) -> None:
     """Write a .blend of one scene and its dependencies; paths of footage are relative to the file.
 
     :raises OSError: when the file is incomplete.
@@ -192,7 +193,7 @@ def _incomplete(path: Path) -> OSError:
     return OSError(errno.ENOSPC, "the file could not be written completely", str(path))
 
 
-def write_bvh(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, unit: str = "cm") -> None:
+def write_bvh(path: Path, scene: Scene, rig: Object, unit: str = "cm") -> None:
     """Write one armature as BVH, sampled at the scene's whole frames.
 
     :param unit: of the file's lengths, ``cm`` or ``m``.
@@ -202,7 +203,7 @@ def write_bvh(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, unit: s
     )
 
 
-def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.SampledPose:
+def sample_armature(scene: Scene, rig: Object) -> bvh.SampledPose:
     """Sample the pose of an armature at every frame of the scene's range, in the world frame."""
     bones = list(rig.data.bones)
     names = [bone.name for bone in bones]
@@ -232,7 +233,7 @@ def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.Sample
     )
 
 
-def _place_at_rest(rig: bpy.types.Object) -> Matrix:
+def _place_at_rest(rig: Object) -> Matrix:
     """Return an armature's transform to the world (4, 4) without its root object's, which is part
     of the motion and would turn the rest pose.
     """
@@ -370,7 +371,7 @@ def _has_all_frames(path: Path) -> bool:
 
 
 @contextmanager
-def corrected_key_times(path: Path, scene: bpy.types.Scene) -> Iterator[None]:
+def corrected_key_times(path: Path, scene: Scene) -> Iterator[None]:
     """Correct the key times of the .glb that the block writes to ``path``."""
     base = scene.render.fps_base
     with changed([scene.render], fps_base=1.0):
@@ -381,7 +382,7 @@ def corrected_key_times(path: Path, scene: bpy.types.Scene) -> Iterator[None]:
 
 
 @contextmanager
-def _corrected_fields_of_view(path: Path, scene: bpy.types.Scene) -> Iterator[None]:
+def _corrected_fields_of_view(path: Path, scene: Scene) -> Iterator[None]:
     """Give every camera of a capture its own shape of the picture, and field of view, in the .glb
     that the block writes to ``path``.
     """

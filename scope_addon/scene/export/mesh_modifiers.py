@@ -16,6 +16,7 @@ from contextlib import contextmanager
 
 import bpy
 import numpy as np
+from bpy.types import Key, Mesh, Object, Scene
 from numpy.typing import NDArray
 
 from ...arrays import Float32Array
@@ -37,7 +38,7 @@ _PLACED = frozenset(("ARRAY", "CAST", "MIRROR", "SCREW", "SIMPLE_DEFORM"))
 
 
 @contextmanager
-def modifiers_applied(scene: bpy.types.Scene, file_name: str) -> Iterator[list[Notice]]:
+def modifiers_applied(scene: Scene, file_name: str) -> Iterator[list[Notice]]:
     """Replace meshes by what their modifiers make of them inside the block, with their shape keys
     and the values of these at the scene's frames.
 
@@ -49,7 +50,7 @@ def modifiers_applied(scene: bpy.types.Scene, file_name: str) -> Iterator[list[N
     shaped = {obj: obj.data.shape_keys for obj in shown if obj.data.shape_keys}
     animated = {keys for keys in shaped.values() if keys.animation_data}
     frames = range(scene.frame_start, scene.frame_end + 1)
-    modified: dict[bpy.types.Object, bpy.types.Mesh] = {}
+    modified: dict[Object, Mesh] = {}
     notices: list[Notice] = []
     in_motion = _modifiers_in_motion(scene, list(shown))
     with in_position(scene.objects, "REST"):
@@ -74,13 +75,11 @@ def modifiers_applied(scene: bpy.types.Scene, file_name: str) -> Iterator[list[N
             yield notices
 
 
-def _shown_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+def _shown_modifiers(obj: Object) -> list[bpy.types.Modifier]:
     return [m for m in obj.modifiers if m.show_viewport and m.type != "ARMATURE"]
 
 
-def _modifiers_in_motion(
-    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]
-) -> set[bpy.types.Modifier]:
+def _modifiers_in_motion(scene: Scene, objects: Sequence[Object]) -> set[bpy.types.Modifier]:
     """Return the modifiers of objects whose effect is another one in every frame: by their kind,
     by their place after the Armature modifier, or because they are keyed or driven.
     """
@@ -107,9 +106,7 @@ def _modifiers_in_motion(
     return found.union(modifier for (modifier, _), seen in values.items() if seen[1:] != seen[:-1])
 
 
-def _modified_mesh(
-    scene: bpy.types.Scene, obj: bpy.types.Object
-) -> tuple[bpy.types.Mesh, list[str]]:
+def _modified_mesh(scene: Scene, obj: Object) -> tuple[Mesh, list[str]]:
     """Return what the modifiers of an object make of its mesh, with its shape keys, and the names
     of those that it lacks, because with them the modifiers make other faces.
     """
@@ -144,7 +141,7 @@ def _modified_mesh(
     return mesh, left_out
 
 
-def _keys_at_zero(mesh: bpy.types.Mesh) -> list[bpy.types.ShapeKey]:
+def _keys_at_zero(mesh: Mesh) -> list[bpy.types.ShapeKey]:
     """Let the shape keys of a mesh take values from 0 to 1, set them to 0, and return them."""
     if mesh.shape_keys is None:
         return []
@@ -157,7 +154,7 @@ def _keys_at_zero(mesh: bpy.types.Mesh) -> list[bpy.types.ShapeKey]:
     return list(mesh.shape_keys.key_blocks)
 
 
-def _add_keys(mesh: bpy.types.Mesh, source: bpy.types.Key, places: dict[str, Float32Array]) -> None:
+def _add_keys(mesh: Mesh, source: Key, places: dict[str, Float32Array]) -> None:
     """Give a mesh a basis, and shape keys with the names, ranges and values of another one's.
 
     :param places: (V, 3) of each key but the basis, by its name.
@@ -175,14 +172,14 @@ def _add_keys(mesh: bpy.types.Mesh, source: bpy.types.Key, places: dict[str, Flo
     bpy.data.objects.remove(obj)
 
 
-def _vertices(mesh: bpy.types.Mesh) -> Float32Array:
+def _vertices(mesh: Mesh) -> Float32Array:
     """Return the vertices (V, 3) of a mesh."""
     vertices = np.empty((len(mesh.vertices), 3), np.float32)
     mesh.attributes["position"].data.foreach_get("vector", vertices.ravel())
     return vertices
 
 
-def _corners(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+def _corners(mesh: Mesh) -> NDArray[np.int32]:
     """Return the vertex at each corner of the faces."""
     corners = np.empty(len(mesh.loops), np.int32)
     mesh.attributes[".corner_vert"].data.foreach_get("value", corners)
