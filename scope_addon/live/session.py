@@ -72,6 +72,16 @@ class _Seen:
     fitted: FittedFrame
 
 
+@dataclass
+class _Estimates:
+    """What is estimated of a person from the first frame on in which they are seen."""
+
+    fit: CausalFit
+    gradual: GradualCalibration
+    current: Calibration  # by which poses are given
+    target: Calibration  # the newest estimate, which `current` approaches
+
+
 class LiveSession:
     """Turns the observations of one person into poses; one call per frame, in order.
 
@@ -102,10 +112,7 @@ class LiveSession:
         self._filter = PoseFilter()
         self._feet = FootHold(body)
         self._left_right = CausalLeftRight(wait=executor is None)
-        self._fit: CausalFit | None = None
-        self._current: Calibration | None = None
-        self._target: Calibration | None = None
-        self._gradual: GradualCalibration | None = None
+        self._known: _Estimates | None = None  # None before the person was seen
         self._pending: Future[Calibration] | None = None
         self._seen: deque[_Seen] = deque()
         # from which time is counted, later by pauses
@@ -126,10 +133,10 @@ class LiveSession:
         fitted = self._fit_person(frame, observation) if observation is not None else None
         self._settle(frame.timestamp_s, may_estimate=fitted is not None)
         self._last_s = frame.timestamp_s
-        if observation is None or fitted is None:
+        if observation is None or fitted is None or self._known is None:
             self._last = self._without_person(frame)
         else:
-            self._last = self._pose(frame, observation, fitted)
+            self._last = self._pose(self._known.current, frame, observation, fitted)
         return self._last
 
     def _fit_person(self, frame: Frame, observation: Observation) -> FittedFrame | None:
@@ -141,28 +148,36 @@ class LiveSession:
         )
         if not all(np.isfinite(value).all() for value in values):
             return None
-        if self._fit is None:
-            if self._first_person is not None:
-                if self._first_person.camera is None:
-                    return None
-                known = replace(self._first_person.camera, focal_deviation=0.0)
-                self._calibrator = Calibrator(self._body, known, self._size, self._height_m)
-            self._calibrator.observe(frame.image_rgb, observation)
-            self._target = self._calibrator.estimate([time_s], [observation])
-            self._current = self._in_first_persons_world(self._target)
-            self._gradual = GradualCalibration(self._target, SETTLING_S)
-            self._fit = CausalFit(self._body, observation, self._current.camera, self._height_m)
-            self._fit.set_shape(self._current.betas)
-            self._first_s = time_s
-            self._calibrations = 1
-        fitted = self._fit.fit(
-            time_s, observation, self._root_of_feet(time_s), self._support(time_s, observation)
-        )
+        if self._known is None:
+            self._known = self._first_estimates(frame, observation)
+        if self._known is None:
+            return None
+        support = self._support(self._known, time_s, observation)
+        fitted = self._known.fit.fit(time_s, observation, self._root_of_feet(time_s), support)
         if fitted is not None:
             self._seen.append(_Seen(time_s, observation, fitted))
             while self._seen[0].time_s < time_s - FOLLOWED_S:
                 self._seen.popleft()
         return fitted
+
+    def _first_estimates(self, frame: Frame, observation: Observation) -> _Estimates | None:
+        """Return the estimates from the first frame; None as long as nobody has seen the source's
+        first person, from whom camera and world are taken.
+        """
+        if self._first_person is not None:
+            if self._first_person.camera is None:
+                return None
+            known = replace(self._first_person.camera, focal_deviation=0.0)
+            self._calibrator = Calibrator(self._body, known, self._size, self._height_m)
+        time_s = frame.timestamp_s
+        self._calibrator.observe(frame.image_rgb, observation)
+        target = self._calibrator.estimate([time_s], [observation])
+        current = self._in_first_persons_world(target)
+        fit = CausalFit(self._body, observation, current.camera, self._height_m)
+        fit.set_shape(current.betas)
+        self._first_s = time_s
+        self._calibrations = 1
+        return _Estimates(fit, GradualCalibration(target, SETTLING_S), current, target)
 
     def _root_of_feet(self, time_s: float) -> FloatArray | None:
         """Return about where the pelvis is, camera frame, if feet rested on the floor in the frame
@@ -178,56 +193,55 @@ class LiveSession:
             else None
         )
 
-    def _support(self, time_s: float, observation: Observation) -> Support | None:
+    def _support(
+        self, known: _Estimates, time_s: float, observation: Observation
+    ) -> Support | None:
         """Return what the body stands on, if it was seen a moment ago."""
         pause_s = time_s - self._last_seen_s
-        if self._current is None or self._fit is None or pause_s >= FLOOR_MEMORY_S:
+        if pause_s >= FLOOR_MEMORY_S:
             return None
-        support = self._feet.support(self._current.T_world_camera, self._fit.soles(observation))
+        soles = known.fit.soles(observation)
+        support = self._feet.support(known.current.T_world_camera, soles)
         return support if support is None or pause_s < HOLD_S else support.after_a_pause()
 
     def _settle(self, time_s: float, *, may_estimate: bool) -> None:
         """Start estimates that are due, take those that are done, and approach the newest one."""
-        if (
-            self._fit is None
-            or self._current is None
-            or self._target is None
-            or self._gradual is None
-        ):
+        known = self._known
+        if known is None:
             return
         if self._pending is not None and self._pending.done():
-            self._target = self._pending.result()
+            known.target = self._pending.result()
             self._pending = None
         if self._pending is None and may_estimate:
-            self._start_estimate(time_s)
+            self._start_estimate(known, time_s)
         step_s = (
             float(np.clip(time_s - self._last_s, 0.0, HOLD_S)) if np.isfinite(self._last_s) else 0.0
         )
         world_s = following_s(time_s - self._first_s) if self.is_settled(time_s) else SETTLING_S
-        before = self._current
-        self._current = self._in_first_persons_world(
-            self._gradual.step(self._target, step_s, world_s)
+        before = known.current
+        known.current = self._in_first_persons_world(
+            known.gradual.step(known.target, step_s, world_s)
         )
-        if self._current.camera is not before.camera:
-            self._fit.set_camera(self._current.camera)
-        if not np.array_equal(self._current.betas, before.betas):
-            self._fit.set_shape(self._current.betas)
+        if known.current.camera is not before.camera:
+            known.fit.set_camera(known.current.camera)
+        if not np.array_equal(known.current.betas, before.betas):
+            known.fit.set_shape(known.current.betas)
 
     def _in_first_persons_world(self, calibration: Calibration) -> Calibration:
         """Return the calibration with camera and world of the person from whom they are taken, if
         there is one.
         """
-        world = self._first_person._current if self._first_person is not None else None
-        if world is None:
+        if self._first_person is None or self._first_person._known is None:
             return calibration
+        world = self._first_person._known.current
         return replace(
             calibration, camera=world.camera, up=world.up, camera_position=world.camera_position
         )
 
-    def _start_estimate(self, time_s: float) -> None:
+    def _start_estimate(self, known: _Estimates, time_s: float) -> None:
         times = [s.time_s for s in self._seen]
         observations = [s.observation for s in self._seen]
-        if not times or self._target is None:
+        if not times:
             return
         if self._calibrations < len(CALIBRATE_AT_S):
             if time_s - self._first_s >= CALIBRATE_AT_S[self._calibrations]:
@@ -239,21 +253,20 @@ class LiveSession:
         elif time_s >= self._next_follow_s and self._first_person is None:
             self._next_follow_s = time_s + FOLLOW_S
             track = track_of(times, observations)
-            fitted = self._fitted_track()
-            known = self._target
-            now = self._current
+            fitted = self._fitted_track(known.current.betas)
+            start = known.target
+            now = known.current
             # estimates that agree with the world as it is leave it so
-            if self.is_settled(time_s) and now is not None:
-                known = replace(known, up=now.up, camera_position=now.camera_position)
-            self._pending = self._start(self._calibrator.follow, known, track, fitted)
+            if self.is_settled(time_s):
+                start = replace(start, up=now.up, camera_position=now.camera_position)
+            self._pending = self._start(self._calibrator.follow, start, track, fitted)
 
-    def _fitted_track(self) -> FittedTrack:
-        assert self._current is not None
+    def _fitted_track(self, betas: FloatArray) -> FittedTrack:
         fits = [s.fitted for s in self._seen]
         return FittedTrack(
             np.array([fit.rotations for fit in fits]),
             np.array([fit.root_cam for fit in fits]),
-            self._current.betas,
+            betas,
             np.ones(len(fits), bool),
             np.array([fit.joint_confidence for fit in fits]),
             0.0,
@@ -269,13 +282,13 @@ class LiveSession:
     @property
     def camera(self) -> Camera | None:
         """The camera as it is known now; None before somebody was seen."""
-        return None if self._current is None else self._current.camera
+        return None if self._known is None else self._known.current.camera
 
-    def _pose(self, frame: Frame, observation: Observation, fitted: FittedFrame) -> LivePose:
-        assert self._current is not None
+    def _pose(
+        self, now: Calibration, frame: Frame, observation: Observation, fitted: FittedFrame
+    ) -> LivePose:
         time_s = frame.timestamp_s
-        now = self._current
-        T = self._current.T_world_camera
+        T = now.T_world_camera
         if time_s - self._last_seen_s > HOLD_S:
             self._filter.reset()
             self._feet.reset()
