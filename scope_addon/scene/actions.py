@@ -178,21 +178,28 @@ def fcurves_in_slot(action: Action, slot: bpy.types.ActionSlot | None) -> list[F
     every F-curve.
     """
     if not has_slots():
-        return list(action.fcurves)
-    found: list[FCurve] = []
-    for layer in action.layers:
-        for strip in layer.strips:
-            bag = strip.channelbag(slot) if slot else None
-            found.extend(bag.fcurves if bag else ())
-    return found
+        return fcurves_of(action)
+    handle = slot.handle if slot else None
+    owners = [owner for place, owner in curve_owners(action) if place[-1] == handle]
+    return [curve for owner in owners for curve in owner.fcurves]
 
 
 def fcurves_of(action: Action) -> list[FCurve]:
     """Return every F-curve of an action, whatever it animates, in any supported Blender."""
+    return [curve for _, owner in curve_owners(action) for curve in owner.fcurves]
+
+
+def curve_owners(action: Action) -> Iterator[tuple[tuple[int, int, int], Any]]:
+    """Yield what has ``fcurves`` and ``groups``, with its place: the channelbag of each slot, with
+    the numbers of its layer and strip and the slot's handle; without slots, the action itself.
+    """
     if not has_slots():
-        return list(action.fcurves)
-    strips = [strip for layer in action.layers for strip in layer.strips]
-    return [curve for strip in strips for bag in strip.channelbags for curve in bag.fcurves]
+        yield (0, 0, 0), action
+        return
+    for row, layer in enumerate(action.layers):
+        for column, strip in enumerate(layer.strips):
+            for bag in strip.channelbags:
+                yield (row, column, bag.slot_handle), bag
 
 
 def read_keys(curve: FCurve) -> Float32Array:

@@ -47,7 +47,7 @@ from .datablocks import (
 )
 from .packed_motion import motion_texts
 from .transaction import all_or_nothing
-from .visibility import world_matrix
+from .visibility import select_only, world_matrix
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ def _build(
     if options.set_frame_range:
         _set_frame_range(scene, collection, first, last)
     scene.frame_set(math.floor(first) if options.set_frame_range else scene.frame_current)
-    _select(people)
+    select_only(bpy.context.view_layer, *(person.armature for person in people))
     return BuildResult(collection, people, rate, (first, last), warnings)
 
 
@@ -300,16 +300,6 @@ def _build_views(
             seen = person.motion.from_view(number)
             warnings += camera.show_footage(obj, path, seen, person.frames)
     return warnings
-
-
-def _select(people: list[Person]) -> None:
-    """Select the new armatures and activate the first one, as Blender's importers do."""
-    view_layer = bpy.context.view_layer
-    for obj in view_layer.objects:
-        obj.select_set(False, view_layer=view_layer)
-    for person in people:
-        person.armature.select_set(True, view_layer=view_layer)
-    view_layer.objects.active = people[0].armature
 
 
 def _check(motion: Motion, body: Body) -> None:

@@ -20,6 +20,7 @@ from bpy.types import ID, Action, FCurve, Key, Object, Scene
 
 from .actions import (
     assign_action,
+    curve_owners,
     has_slots,
     read_modifiers,
     read_whole_keys,
@@ -29,6 +30,7 @@ from .actions import (
 )
 from .datablocks import NewDatablocks, action_of, enter_object_mode
 from .timing import action_strips, set_strip_ends, strip_ends
+from .visibility import Selection
 
 _SCENE = ("frame_start", "frame_end", "frame_preview_start", "frame_preview_end", "camera")
 RENDER = ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y")
@@ -94,12 +96,8 @@ class _SavedScene:
         self._settings = {name: getattr(scene, name) for name in _SCENE}
         self._render = {name: getattr(scene.render, name) for name in RENDER}
         self._current = scene.frame_current, scene.frame_subframe
-        self._active = self.layer.objects.active
-        self._mode = self._active.mode if self._active else "OBJECT"
+        self._selection = Selection(self.layer)
         self._markers = {m: (m.name, m.frame) for m in scene.timeline_markers}
-        self._selected = [
-            obj for obj in self.layer.objects if obj.select_get(view_layer=self.layer)
-        ]
 
     def restore(self) -> None:
         """Restore the scene; the new objects must have been removed."""
@@ -115,11 +113,8 @@ class _SavedScene:
         for name, value in self._settings.items():
             setattr(scene, name, value)
         scene.frame_set(self._current[0], subframe=self._current[1])
-        for obj in self.layer.objects:
-            obj.select_set(obj in self._selected, view_layer=self.layer)
-        self.layer.objects.active = self._active
-        if self._active is not None and self._mode != self._active.mode:
-            bpy.ops.object.mode_set(mode=self._mode)
+        self._selection.restore(self.layer)
+        self._selection.restore_mode()
 
 
 class _SavedTransform:
@@ -219,25 +214,12 @@ def restore_content(action: Action, copy: Action) -> None:
     :param action: since the copy was made, it has lost no slot, layer or strip.
     """
     _remove_new_containers(action, copy)
-    wanted = dict(_owners(copy))
-    for place, owner in _owners(action):
+    wanted = dict(curve_owners(copy))
+    for place, owner in curve_owners(action):
         _restore_curves(owner, wanted[place])
     for name in _SETTINGS:
         if getattr(action, name) != getattr(copy, name):
             setattr(action, name, getattr(copy, name))
-
-
-def _owners(action: Action) -> Iterator[tuple[tuple[int, int, int], Any]]:
-    """Yield what has ``fcurves`` and ``groups``, with its place: the action itself, or the
-    channelbag of each slot.
-    """
-    if not has_slots():
-        yield (0, 0, 0), action
-        return
-    for row, layer in enumerate(action.layers):
-        for column, strip in enumerate(layer.strips):
-            for bag in strip.channelbags:
-                yield (row, column, bag.slot_handle), bag
 
 
 def _remove_new_containers(action: Action, copy: Action) -> None:
@@ -249,9 +231,9 @@ def _remove_new_containers(action: Action, copy: Action) -> None:
         action.slots.remove(slot)
     for layer in list(action.layers)[len(copy.layers) :]:
         action.layers.remove(layer)
-    places = {place for place, _ in _owners(copy)}
+    places = {place for place, _ in curve_owners(copy)}
     for (row, column, _), bag in [
-        (place, bag) for place, bag in _owners(action) if place not in places
+        (place, bag) for place, bag in curve_owners(action) if place not in places
     ]:
         action.layers[row].strips[column].channelbags.remove(bag)
 

@@ -105,27 +105,51 @@ def world_matrix(obj: Object) -> Matrix:
         return obj.matrix_world.copy()
 
 
-def select_only(layer: ViewLayer, chosen: Object) -> None:
-    """Make an object the active and the only selected one."""
+def select_only(layer: ViewLayer, *chosen: Object) -> None:
+    """Select these objects alone, and make the first of them active."""
     layer.update()
     for obj in layer.objects:
-        obj.select_set(obj == chosen, view_layer=layer)
-    layer.objects.active = chosen
+        obj.select_set(obj in chosen, view_layer=layer)
+    layer.objects.active = chosen[0]
+
+
+class Selection:
+    """The selected objects of a view layer, the active one and its mode, by their sessions'
+    identifiers: undo replaces objects.
+    """
+
+    def __init__(self, layer: ViewLayer) -> None:
+        active = layer.objects.active
+        self.selected = {o.session_uid for o in layer.objects if o.select_get(view_layer=layer)}
+        self.active = active.session_uid if active else 0
+        self.mode = active.mode if active else "OBJECT"
+
+    def restore(self, layer: ViewLayer) -> None:
+        """Select and activate what still exists; the mode stays."""
+        active = None
+        for obj in layer.objects:
+            obj.select_set(obj.session_uid in self.selected, view_layer=layer)
+            if obj.session_uid == self.active:
+                active = obj
+        layer.objects.active = active
+
+    def restore_mode(self) -> None:
+        """Give the active object of the context its mode, if it is the same object."""
+        active = bpy.context.view_layer.objects.active
+        if active is not None and active.session_uid == self.active and active.mode != self.mode:
+            bpy.ops.object.mode_set(mode=self.mode)
 
 
 class SceneBefore:
-    """The view layer of the context. Objects are kept by name, because undo replaces them."""
+    """The selection of the context's view layer, and which of its objects are hidden."""
 
     def __init__(self) -> None:
         layer = bpy.context.view_layer
         layer.update()
         self._scene_uid = bpy.context.scene.session_uid
         self._layer = layer.name
-        active = layer.objects.active
-        self._active: str = active.name if active else ""
-        self._mode: str = active.mode if active else "OBJECT"
-        self._selected = {obj.name for obj in layer.objects if obj.select_get(view_layer=layer)}
-        self._hidden = {obj.name for obj in layer.objects if obj.hide_get(view_layer=layer)}
+        self._selection = Selection(layer)
+        self._hidden = {o.session_uid for o in layer.objects if o.hide_get(view_layer=layer)}
 
     def restore(self) -> None:
         """Restore what still exists."""
@@ -135,18 +159,12 @@ class SceneBefore:
             return
         layer.update()  # it still lists what was just removed
         for obj in layer.objects:
-            hidden = obj.name in self._hidden
+            hidden = obj.session_uid in self._hidden
             if obj.hide_get(view_layer=layer) != hidden:
                 obj.hide_set(hidden, view_layer=layer)
-            obj.select_set(obj.name in self._selected, view_layer=layer)
-        layer.objects.active = layer.objects.get(self._active)
-        is_shown = layer == bpy.context.view_layer
-        if (
-            is_shown
-            and layer.objects.active is not None
-            and layer.objects.active.mode != self._mode
-        ):
-            bpy.ops.object.mode_set(mode=self._mode)
+        self._selection.restore(layer)
+        if layer == bpy.context.view_layer:
+            self._selection.restore_mode()
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from uuid import uuid4
 
 import bpy
 import numpy as np
-from bpy.types import Object, PropertyGroup, Scene, ViewLayer
+from bpy.types import PropertyGroup, Scene
 
 from ..arrays import BoolArray, Float64Array
 from ..capture_report import Report
@@ -33,12 +33,12 @@ from ..options.body_choice import chosen_body
 from ..options.capture import AUTO
 from ..review_spans import Span, body_sigma_m, find_review_spans
 from ..scene.build import BuildOptions, BuildResult, build_scene
-from ..scene.datablocks import captures_of, check_local, found, holds
+from ..scene.datablocks import captures_of, check_local, found
 from ..scene.match_rate import is_animated
 from ..scene.packed_motion import pack_motion
 from ..scene.stored_values import FrameSpan, in_scene
 from ..scene.timing import current_frame_kept
-from ..scene.visibility import window_shows
+from ..scene.visibility import Selection, window_shows
 from ..untrusted.body_file import load_body
 from . import warm_up
 from .captures import hide_others, show_again
@@ -66,7 +66,7 @@ class CaptureJob:
         self.cancelled = False
         self.messages = 0  # of the worker so far
         self._scene_uid = scene.session_uid
-        self._selection = Selection(scene)
+        self._selection = selection_in(scene)
         self._options = build_options(scene)
         self._is_automatic = scene.scope.frame_rate == AUTOMATIC
         self._request = capture_request(scene)
@@ -167,8 +167,7 @@ class CaptureJob:
             options = replace(options, frame_rate=_automatic_frame_rate(scene))
         views = report.placed_videos(self._request.views)
         view_footage = [path if path.is_file() else None for path in views]
-        is_busy = Selection(scene).shows_work(since=self._selection)
-        with selection_kept(scene) if is_busy else nullcontext():
+        with work_kept(scene, self._selection):
             build_capture(
                 scene,
                 [(path, path.read_bytes()) for path in captured.motions],
@@ -179,59 +178,37 @@ class CaptureJob:
             )
 
 
-class Selection:
-    """The selected objects of the view layer that a scene is shown in, the active one, and its
-    mode.
-    """
-
-    def __init__(self, scene: Scene) -> None:
-        self._is_shown = bpy.context.scene == scene
-        layer = bpy.context.view_layer if self._is_shown else scene.view_layers[0]
-        active = layer.objects.active
-        self._selected = {obj.session_uid for obj in _selected_objects(layer)}
-        self._active = active.session_uid if active else 0
-        self._mode = active.mode if active else "OBJECT"
-
-    def shows_work(self, since: Selection) -> bool:
-        """Return whether the user has begun to work on something else: what is selected is not what
-        was selected before, or is being edited.
-        """
-        if not self._is_shown:
-            return False
-        if self._mode not in ("OBJECT", "POSE"):
-            return True
-        now = self._selected, self._active, self._mode
-        before = since._selected, since._active, since._mode
-        return bool(self._selected) and now != before
-
-
-def _selected_objects(layer: ViewLayer) -> list[Object]:
-    return [obj for obj in layer.objects if obj.select_get(view_layer=layer)]
+def selection_in(scene: Scene) -> Selection:
+    """Return what is selected in the view layer that a scene is shown in."""
+    is_shown = bpy.context.scene == scene
+    return Selection(bpy.context.view_layer if is_shown else scene.view_layers[0])
 
 
 @contextmanager
-def selection_kept(scene: Scene) -> Iterator[None]:
-    """Keep the selection, the active object, its mode and the current frame while a capture is
-    built, and show other captures that something is selected of.
+def work_kept(scene: Scene, before: Selection) -> Iterator[bool]:
+    """If the user has begun to work on something else since ``before``, keep the selection, the
+    active object, its mode and the current frame while a capture is built, and show other captures
+    that something is selected of; give the block whether it is so.
+
+    They have if what is selected is not what was selected before, or is being edited.
     """
-    layer = bpy.context.view_layer
-    selected = _selected_objects(layer)
-    active = layer.objects.active
-    mode = active.mode if active else "OBJECT"
-    with current_frame_kept(scene):
-        yield
-    for capture in captures_of(scene):
-        if any(holds(capture, obj) for obj in selected):
-            show_again(capture)
-    for obj in layer.objects:
-        obj.select_set(obj in selected, view_layer=layer)
-    layer.objects.active = active
-    if mode == "OBJECT":
+    now = selection_in(scene)
+    is_edited = now.mode not in ("OBJECT", "POSE")
+    is_busy = is_edited or (now.selected and vars(now) != vars(before))
+    if bpy.context.scene != scene or not is_busy:
+        yield False
         return
+    layer = bpy.context.view_layer
+    with current_frame_kept(scene):
+        yield True
+    for capture in captures_of(scene):
+        if any(obj.session_uid in now.selected for obj in capture.all_objects):
+            show_again(capture)
+    now.restore(layer)
     # The modes that edit data have undo steps of their own, which do not contain the capture.
-    if mode != "POSE" and not bpy.app.background:
+    if is_edited and not bpy.app.background:
         bpy.ops.ed.undo_push(message="Capture")
-    bpy.ops.object.mode_set(mode=mode)
+    now.restore_mode()
 
 
 def build_capture(

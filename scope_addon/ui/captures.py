@@ -16,6 +16,7 @@ from bpy.types import Context, Object, Operator, PropertyGroup, Scene, UILayout,
 
 from ..notices import notice
 from ..scene.datablocks import captures_of, is_in_layer, is_person, with_data
+from ..scene.visibility import select_only
 from .captured_person import captured_armature
 from .reporting import iface_, sentence, tip_
 
@@ -150,10 +151,7 @@ def _make_active(capture: bpy.types.Collection) -> None:
         or (active is not None and active.mode != "OBJECT")
     ):
         return
-    for obj in context.selected_objects:
-        obj.select_set(False)
-    people[0].select_set(True)
-    layer.objects.active = people[0]
+    select_only(layer, people[0])
 
 
 def elided(text: str, width: float, measure: Callable[[str], float]) -> str:

@@ -40,11 +40,11 @@ from ..scene.visibility import SceneBefore, hide, select_only, window_shows
 from ..temporary import remove
 from ..untrusted.body_file import load_body
 from .capture_job import (
-    Selection,
     build_capture,
     build_options,
     chosen_values,
-    selection_kept,
+    selection_in,
+    work_kept,
 )
 from .captures import hide_others, show_again
 from .live_properties import with_login
@@ -100,7 +100,7 @@ class LiveJob:
         ]
         self._bodies = [LiveBody(scene, name, self._scene_body) for name in names]
         self._before = SceneBefore()
-        self._selection = Selection(scene)  # as the user or the first live body has left it
+        self._selection = selection_in(scene)  # as the user or the first live body has left it
         follows = scene.scope_live.with_rig and unfinished is None
         self._rig = live_rig(scene, self._scene_body) if follows else None
         self._result: dict[str, Any] | None = None  # the recording's message
@@ -267,15 +267,15 @@ class LiveJob:
 
     def _show_person(self, scene: Scene, pose: ShownPose) -> None:
         body = self._bodies[pose.person]
-        is_busy = body.armature is None and Selection(scene).shows_work(since=self._selection)
-        with selection_kept(scene) if is_busy else nullcontext():
+        is_new = body.armature is None
+        with work_kept(scene, self._selection) if is_new else nullcontext(False) as is_busy:
             created = body.show(pose.rotations, pose.pelvis, pose.betas)
         if created and not self._was_created:
             self.created = self._was_created = True
             self.selects_body = not is_busy
             if self.selects_body:
                 select_only(bpy.context.view_layer, body.armature)
-                self._selection = Selection(scene)
+                self._selection = selection_in(scene)
         if created:
             self._hidden |= {capture.session_uid for capture in hide_others(scene, [])}
         if self._rig is not None and pose.person == 0:
@@ -323,8 +323,7 @@ class LiveJob:
             scene.scope.forget_places()
             scene.scope.views.clear()
             scene.scope.queue.clear()
-        is_busy = Selection(scene).shows_work(since=self._selection)
-        with selection_kept(scene) if is_busy else nullcontext():
+        with work_kept(scene, self._selection):
             built = build_capture(
                 scene, contents, body, self._footage, Report.from_json(result["report"]), options
             )
