@@ -73,7 +73,7 @@ def shot_of(motion: Motion, start: float = 0.0) -> Shot:
     )
 
 
-def distance_from_pin(motion: Motion, pin: Pin, place: Float64Array | None = None) -> float:
+def distance_from_pin(motion: Motion, pin: Pin, place: Float64Array | None) -> float:
     """Return how far a joint is from its pin: pixels of a pin in the image, metres of one in space.
 
     :param place: (3,) metres, the joint in the world; if None, the motion's own.

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..arrays import Float64Array
+from ..kinematics.axes import unit
 from .bone_map import FINGERS
 from .rest_pose import RestPose
 
@@ -135,8 +136,7 @@ def _by_geometry(rest: RestPose, wrist: int, below: list[int]) -> dict[str, list
         not _PHALANGES <= len(chain) <= _PHALANGES + 2 for chain in chains
     ):
         return {}
-    along = np.array([heads[chain[-1]] - heads[chain[0]] for chain in chains])
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    along = unit(np.array([heads[chain[-1]] - heads[chain[0]] for chain in chains]))
     thumb = int((along @ along.sum(axis=0)).argmin())
     middles = np.array([heads[chain].mean(axis=0) for chain in chains])
     order = np.argsort(np.linalg.norm(middles - middles[thumb], axis=1), kind="stable")

@@ -286,7 +286,7 @@ def ankle_goal(
     scales: Float64Array,
     turn: Float64Array,
     ankle: Float64Array,
-    one_floor: BoolArray | bool = True,
+    one_floor: BoolArray,
 ) -> Float64Array:
     """Compute the goals of the rig's ankles, for any number of frames and feet at once.
 

@@ -23,7 +23,7 @@ from ...solver.body import Body
 from ...solver.rotations import log, shortest_turn
 from ..arrays import Float64Array
 from ..errors import MotionFileError
-from ..kinematics.axes import R_WORLD_MODEL, UP, rotated, transposed
+from ..kinematics.axes import R_WORLD_MODEL, UP, rotated, transposed, unit
 from ..kinematics.frame_blocks import by_blocks
 from ..kinematics.smoothing import interpolate_rotations
 from ..notices import Notice, notice
@@ -130,7 +130,7 @@ class Performer:
         return poses.astype(float), root, [*self.notes, *notes]
 
 
-def find_performers(file: BvhMotion, path: Path, up: str = "auto") -> list[Performer]:
+def find_performers(file: BvhMotion, path: Path, up: str) -> list[Performer]:
     """Find the people of a file, of whom each has a root of their own; other roots are left out.
 
     :param path: names the file in messages.
@@ -259,7 +259,7 @@ def _limbs(
         chosen = points[:, joints]
     trunk = chosen[:, :1] - chosen[:, 1:3].mean(axis=1, keepdims=True)
     along = np.concatenate([trunk, chosen[:, 1:3] - chosen[:, 3:]], axis=1)
-    return along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-12)
+    return unit(along)
 
 
 def _of_parts(turns: Float64Array, part_of: list[str], body: Body) -> Float64Array:

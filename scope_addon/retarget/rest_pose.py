@@ -20,6 +20,7 @@ import numpy as np
 
 from ..arrays import Float64Array, IndexArray
 from ..kinematics.axes import rotated, transposed
+from .bone_map import BoneMap
 
 # Below this share of the rig's size, two heads are at the same place.
 _SAME_PLACE = 0.002
@@ -289,6 +290,10 @@ class Skeleton:
         return rotated(
             transposed(self.rotations[self.carriers]), self.heads - self.heads[self.carriers]
         )
+
+    def rows(self, bone_map: BoneMap) -> dict[str, int]:
+        """Return the row of each part that has a bone here, of several bones the last."""
+        return {p: self.names.index(b) for b, p in bone_map.parts.items() if b in self.names}
 
     @cached_property
     def rested(self) -> Float64Array:

@@ -36,9 +36,7 @@ _MAX_PALM_TURN = np.radians(100)
 
 def leg_ratio(body: Body, betas: FloatArray, rig: Skeleton, bone_map: BoneMap) -> float:
     """Return the rig's leg length divided by that of the body with the shape ``betas`` (P,)."""
-    rows = {
-        part: rig.names.index(bone) for bone, part in bone_map.parts.items() if bone in rig.names
-    }
+    rows = rig.rows(bone_map)
     parts = {part: body.joint_names.index(part) for part in rows}
     return leg_length(rig.heads, rows) / leg_length(body.rest_joints(betas), parts)
 
@@ -71,11 +69,7 @@ class Transfer:
         self._rig = rig
         index = {part: k for k, part in enumerate(body.joint_names)}
         rest = body.rest_joints(betas) @ R_WORLD_MODEL.T
-        row = {
-            part: rig.names.index(bone)
-            for bone, part in bone_map.parts.items()
-            if bone in rig.names
-        }
+        row = rig.rows(bone_map)
         part_of = [bone_map.parts[name] for name in rig.names]
         self._first, self._second, self._shares = _between(part_of, index)
         F = _heading_alignment(rig, row)

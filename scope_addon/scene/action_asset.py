@@ -43,7 +43,7 @@ _LIGHT = np.array([-0.45, 0.6, 0.66])  # unit vector towards the light: right, u
 _AMBIENT = 0.4
 
 
-def mark_action(action: Action, author: str = "", description: str = "", catalog: str = "") -> None:
+def mark_action(action: Action, author: str, description: str, catalog: str) -> None:
     """Mark an action as an asset, or change the metadata of one; tags that the user has given it
     stay.
 

@@ -162,11 +162,6 @@ def play_cycle(scene: Scene, armature: Object, first: int, last: int) -> None:
     armature[_CYCLE] = f"{scene.frame_start} {scene.frame_end} {before[0]} {before[1]}"
 
 
-def is_cycle(armature: Object) -> bool:
-    """Return whether an armature's motion was cut to a cycle."""
-    return bool(_stored_ranges(armature)[0])
-
-
 def cycle_span(armature: Object) -> tuple[int, int] | None:
     """Return the frames of the first and the last key of an armature's cycle, rounded; None without
     a cycle. The last key is that of the first pose once more, which is not played.

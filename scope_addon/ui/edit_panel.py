@@ -142,7 +142,7 @@ class SCOPE_OT_smooth(EditOperator):
         from ..scene.character.other_curves import restore_whole_motion
         from ..scene.character.root_object import check_own_action, root_object
         from ..scene.character.uncorrected_keys import write_both
-        from ..scene.timing import is_cycle, key_frames, restore_scene_range, store_rate
+        from ..scene.timing import cycle_span, key_frames, restore_scene_range, store_rate
 
         motion = motion_of(armature)
         check_times_of_keys(armature, motion, rate)
@@ -160,7 +160,7 @@ class SCOPE_OT_smooth(EditOperator):
             write_clip(armature, body, clip, frames)
         armature["scope_smoothing"] = self.strength
         store_rate(armature, rate)
-        if is_cycle(armature):  # a loop becomes the whole motion again
+        if cycle_span(armature) is not None:  # a loop becomes the whole motion again
             restore_whole_motion(armature, body, motion, frames)
         for block in animated_together(armature, None):
             remove_cycles(block)

@@ -192,18 +192,20 @@ def _intrinsics(scene: Scene, camera: Object) -> Float64Array:
             "type is Perspective"
         )
     render = scene.render
-    width, height = render.resolution_x, render.resolution_y
-    aspect = render.pixel_aspect_y / render.pixel_aspect_x
-    is_wide = width >= aspect * height
-    if data.sensor_fit == "VERTICAL" or (data.sensor_fit == "AUTO" and not is_wide):
-        side = aspect * height
-    else:
-        side = float(width)
-    sensor = data.sensor_height if data.sensor_fit == "VERTICAL" else data.sensor_width
-    fx = side * data.lens / sensor
-    cx = 0.5 * width - side * data.shift_x
-    cy = 0.5 * height + side * data.shift_y / aspect
-    return np.array([[fx, 0.0, cx], [0.0, fx / aspect, cy], [0.0, 0.0, 1.0]])
+    width = render.resolution_x
+    height = render.resolution_y
+    projection = camera.calc_matrix_camera(
+        bpy.context.evaluated_depsgraph_get(),
+        x=width,
+        y=height,
+        scale_x=render.pixel_aspect_x,
+        scale_y=render.pixel_aspect_y,
+    )
+    fx = 0.5 * width * projection[0][0]
+    fy = 0.5 * height * projection[1][1]
+    cx = 0.5 * width * (1.0 - projection[0][2])
+    cy = 0.5 * height * (1.0 + projection[1][2])
+    return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
 
 def _pose(scene: Scene, camera: Object, frame: int) -> Float64Array:

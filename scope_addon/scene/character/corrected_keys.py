@@ -66,9 +66,9 @@ def rewrite_changed_keys(
     rate: float,
     before: Motion,
     after: Motion,
-    stored: object = None,
-    added: Correction | None = None,
-    rise: float = 0.0,
+    stored: object,
+    added: Correction | None,
+    rise: float,
 ) -> UncorrectedKeys:
     """Change the keys from one motion to another, which differs from it in its corrections.
 

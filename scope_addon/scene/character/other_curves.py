@@ -213,7 +213,7 @@ def add_review_markers(
     prefix: str,
     motion: Motion,
     frames: Float64Array,
-    under_floor: BoolArray | None = None,
+    under_floor: BoolArray,
 ) -> list[str]:
     """Add a timeline marker at the start of each review span; return the names of the new ones.
 

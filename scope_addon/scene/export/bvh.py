@@ -43,7 +43,7 @@ class SampledPose:
     rate: float  # frames per second
 
 
-def bvh_text(pose: SampledPose, unit: str = "cm") -> str:
+def bvh_text(pose: SampledPose, unit: str) -> str:
     """Return the content of the file; names are without spaces, at which readers would cut them
     off.
 

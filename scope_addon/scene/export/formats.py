@@ -193,7 +193,7 @@ def _incomplete(path: Path) -> OSError:
     return OSError(errno.ENOSPC, "the file could not be written completely", str(path))
 
 
-def write_bvh(path: Path, scene: Scene, rig: Object, unit: str = "cm") -> None:
+def write_bvh(path: Path, scene: Scene, rig: Object, unit: str) -> None:
     """Write one armature as BVH, sampled at the scene's whole frames.
 
     :param unit: of the file's lengths, ``cm`` or ``m``.
