@@ -22,7 +22,7 @@ from ...solver import Body, Fit, Floor, FootContacts, FrameSolver, Measurements,
 from ..arrays import FloatArray, IndexArray
 from ..capture.camera.intrinsics import Camera
 from ..capture.fitting.frame_measurements import Measurer
-from ..capture.fitting.frame_sequence import LONGEST_COAST_S, is_usable
+from ..capture.fitting.frame_sequence import LONGEST_COAST_S, is_usable, rotations_of
 from ..capture.fitting.prepared_track import prepare_track
 from ..capture.fitting.weights import ROBUST, cold_stages, warm_stages
 from ..capture.perception.landmark_network import KEYPOINT_COUNT, KEYPOINT_NAMES
@@ -175,7 +175,7 @@ class CausalFit:
         self._last_s = time_s
         state = found.state
         return FittedFrame(
-            np.concatenate([state.R_camera_root[None], state.Omega]),
+            rotations_of(state),
             state.t_camera_root,
             observation.keypoints_confidence @ self._shares,
             self.soles(observation),

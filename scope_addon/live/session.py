@@ -13,7 +13,7 @@ import numpy as np
 from ...solver import Body, State
 from ..arrays import Float64Array, FloatArray
 from ..capture.camera.intrinsics import Camera
-from ..capture.fitting.frame_sequence import FittedTrack
+from ..capture.fitting.frame_sequence import FittedTrack, rotations_of
 from ..capture.media.frame import Frame
 from ..capture.perception.observation import Observation
 from ..capture.tracking.track import track_of
@@ -333,7 +333,7 @@ class LiveSession:
     def _rest(self) -> LivePose:
         body = self._body
         state = State.rest(self._body.K, self._body.P)
-        rotations = np.concatenate([state.R_camera_root[None], state.Omega])
+        rotations = rotations_of(state)
         height = float(body.stature(state.beta)) / 2
         level = Calibration(
             Camera(np.eye(3), np.zeros(5), ""),

@@ -43,6 +43,11 @@ class FittedTrack:
     joint_sigma_m: FloatArray | None = None
     height_sigma_m: float = float("nan")  # standard deviation of the stature of `betas`
 
+    def state(self, k: int) -> State:
+        """Return the state in frame ``k``."""
+        rotations = self.rotations[k]
+        return State(rotations[0], self.t_camera_root[k], rotations[1:], self.betas)
+
     def with_fingers_at_rest(self, prepared: PreparedTrack) -> FittedTrack:
         """Return the motion of the whole body; fingers that were not fitted are at rest.
 
@@ -193,8 +198,7 @@ class FrameSequence:
         return found
 
     def _store(self, k: int, fit: Fit) -> None:
-        self._rotations[k, 0] = fit.state.R_camera_root
-        self._rotations[k, 1:] = fit.state.Omega
+        self._rotations[k] = rotations_of(fit.state)
         self._root[k] = fit.state.t_camera_root
         self._cost[k] = fit.cost
 
@@ -223,6 +227,11 @@ def with_hands(
     if fingers is not None:
         rotations = smooth_fingers(rotations, fingers, seen & valid[:, None], times)
     return rotations, confidence
+
+
+def rotations_of(state: State) -> FloatArray:
+    """Return the (K+1, 3, 3) rotations of a state: R_camera_root, then Ω."""
+    return np.concatenate([state.R_camera_root[None], state.Omega])
 
 
 def is_usable(fit: Fit) -> bool:

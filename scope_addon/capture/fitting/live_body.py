@@ -19,6 +19,7 @@ from ..perception.landmark_network import HIPS, KEYPOINT_NAMES
 from ..perception.observation import Observation
 from ..perception.region import Region
 from ..tracking.track import single_frame_track
+from .frame_sequence import rotations_of
 from .prepared_track import prepare_track
 from .track_fit import fit_single_frame
 from .weights import ROBUST
@@ -94,10 +95,8 @@ class LiveBody:
 
 def _part_poses(body: Body, state: State) -> tuple[FloatArray, FloatArray]:
     """Return part poses (K+1, 3, 3) and (K+1, 3), camera frame."""
-    rotations = np.concatenate([state.R_camera_root[None], state.Omega])
-    return body.forward_kinematics(
-        rotations, state.t_camera_root - body.rest_joints(state.beta)[0], state.beta
-    )
+    trans = state.t_camera_root - body.rest_joints(state.beta)[0]
+    return body.forward_kinematics(rotations_of(state), trans, state.beta)
 
 
 def _rest_observation(body: Body, camera: Camera) -> Observation:

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ....solver import ClipFit, Fit, State, fit_clip
+from ....solver import ClipFit, Fit, fit_clip
 from ...arrays import FloatArray, round_array
 from ...clock import Progress
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
@@ -90,15 +90,7 @@ def fit_each_frame(prepared: PreparedTrack, start: FittedTrack, progress: Progre
     T = len(start.valid)
     for k in range(T):
         if start.valid[k]:
-            frames.refit(
-                k,
-                State(
-                    start.rotations[k, 0],
-                    start.t_camera_root[k],
-                    start.rotations[k, 1:],
-                    np.zeros(0),
-                ),
-            )
+            frames.refit(k, replace(start.state(k), beta=np.zeros(0)))
         frames.repeat_last(k)
         if k % PROGRESS_FRAMES == 0 or k == T - 1:
             progress("solving each frame", k + 1, T)

@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ....solver import Body, MotionFit, MotionPrior, State, fit_motion
+from ....solver import Body, MotionFit, MotionPrior, fit_motion
 from ...arrays import Float64Array, IndexArray
 from ...clock import Progress
 from ...kinematics.frame_blocks import to_single_precision
 from ..camera.intrinsics import Camera
 from ..fitting.frame_measurements import Measurer
-from ..fitting.frame_sequence import FittedTrack, with_hands
+from ..fitting.frame_sequence import FittedTrack, rotations_of, with_hands
 from ..fitting.hand_measurements import HandMeasurer
 from ..fitting.outline import fit_shape_to_outline, usable_masks
 from ..fitting.prepared_track import (
@@ -250,15 +250,11 @@ def _bone_derivatives(body: Body, betas: Float64Array) -> Float64Array:
 def fit_views_alone(prepared: PreparedTrack, start: FittedTrack) -> FittedTrack:
     """Fit every frame alone to what all cameras see, from its state in another motion."""
     frames = np.flatnonzero(start.valid)
-    states = [
-        State(start.rotations[k, 0], start.t_camera_root[k], start.rotations[k, 1:], start.betas)
-        for k in frames
-    ]
     found = fit_motion(
         prepared.body,
         [prepared.views(k, prepared.measure_all(k), True) for k in frames],
         prepared.track.times[frames],
-        init=states,
+        init=[start.state(k) for k in frames],
         priors=prepared.priors,
         options=replace(ROBUST, stages=clip_stages(prepared.weights)),
         motion=MotionPrior(
@@ -286,7 +282,7 @@ def _fitted(prepared: PreparedTrack, frames: IndexArray, found: MotionFit) -> Fi
     valid = np.zeros(T, bool)
     valid[frames] = True
     row = np.maximum(np.searchsorted(frames, np.arange(T), side="right") - 1, 0)
-    rotations = np.array([[state.R_camera_root, *state.Omega] for state in found.states])
+    rotations = np.array([rotations_of(state) for state in found.states])
     root = np.array([state.t_camera_root for state in found.states])
     confidence = prepared.measurer.joint_confidence(prepared.track.confidence)
     for other in prepared.others:

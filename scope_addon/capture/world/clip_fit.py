@@ -34,7 +34,7 @@ from ...clock import Progress
 from ...kinematics.body_surface import BodySurface
 from ...kinematics.mirrored_limbs import LIMBS, bone_depths, mirrored_limb, runs_of_one_sign
 from ...kinematics.smoothing import interpolate_rotations
-from ..fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
+from ..fitting.frame_sequence import LONGEST_COAST_S, FittedTrack, rotations_of
 from ..fitting.prepared_track import PreparedTrack
 from ..fitting.weights import motion_priors
 from .camera_path import CameraPath
@@ -82,10 +82,10 @@ class _Clip:
         self._prepared = prepared
         self._path = path
         self._progress = progress
-        self._start = start
         first = path.to_first(start)
-        self._rotations = first.rotations.copy()
-        self._root = first.t_camera_root.copy()
+        self._motion = replace(
+            first, rotations=first.rotations.copy(), t_camera_root=first.t_camera_root.copy()
+        )
         self._surface = BodySurface(prepared.body, np.asarray(start.betas, float))
         self._done = np.zeros(len(start.valid), bool)
         self._sigma = np.full((*first.rotations.shape[:2], 2), np.nan, np.float32)
@@ -99,8 +99,8 @@ class _Clip:
         times = self._prepared.track.times[frames]
         every = slice(0, len(frames))
         quadratic, robust = motion_priors(body, times)
-        window = ClipWindow.of(self._prepared, self._path, frames, self._start.betas)
-        found = window.fit(every, [self._state(k) for k in frames], quadratic)
+        window = ClipWindow.of(self._prepared, self._path, frames, self._motion.betas)
+        found = window.fit(every, [self._motion.state(k) for k in frames], quadratic)
         # Several cameras tell the two poses apart.
         alone = not self._prepared.others
         better = search_limbs(body, window, found, quadratic) if alone else None
@@ -117,26 +117,22 @@ class _Clip:
 
     def fitted(self) -> FittedTrack:
         """Return the states in each frame's camera."""
-        first = replace(self._start, rotations=self._rotations, t_camera_root=self._root)
-        return replace(self._path.to_frames(first), joint_sigma_m=self._sigma)
-
-    def _state(self, k: int) -> State:
-        return State(
-            self._rotations[k, 0], self._root[k], self._rotations[k, 1:], self._start.betas
-        )
+        return replace(self._path.to_frames(self._motion), joint_sigma_m=self._sigma)
 
     def _keep(self, frames: IndexArray, found: MotionFit) -> None:
-        rotations = np.array([[state.R_camera_root, *state.Omega] for state in found.states])
+        motion = self._motion
+        rotations = np.array([rotations_of(state) for state in found.states])
         root = np.array([state.t_camera_root for state in found.states])
         both = int(self._done[frames].sum())
         share = (np.arange(both) + 1.0) / (both + 1.0)
-        earlier = self._rotations[frames[:both]].astype(float)
+        earlier = motion.rotations[frames[:both]].astype(float)
         rotations[:both] = interpolate_rotations(earlier, rotations[:both], share[:, None])
         root[:both] = (
-            self._root[frames[:both]] * (1 - share[:, None]) + root[:both] * share[:, None]
+            motion.t_camera_root[frames[:both]] * (1 - share[:, None])
+            + root[:both] * share[:, None]
         )
-        self._rotations[frames] = rotations
-        self._root[frames] = root
+        motion.rotations[frames] = rotations
+        motion.t_camera_root[frames] = root
         self._sigma[frames] = self._blended_sigma(frames, found, share)
         self._done[frames] = True
 
