@@ -22,7 +22,7 @@ import sys
 import tomllib
 import zipfile
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -30,6 +30,7 @@ from bill_of_materials import bill_of_materials
 from guide_pages import FILES as GUIDE
 from guide_pages import write_pages
 from shipped_kernels import add_kernels
+from source_time import source_time
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
@@ -70,7 +71,6 @@ LEFT_OUT = (
 )
 BILL = "bill_of_materials.cdx.json"  # in the zip; a copy with the zip's name lies beside it
 LIMIT_MB = 200
-_OLDEST = 315532800  # 1980-01-01, the first time that a zip can state
 
 
 @dataclass(frozen=True)
@@ -192,22 +192,6 @@ def build(target: Target, folder: Path, website: str = "", *, kernels: bool = Tr
     blender_extension("validate", str(archive))
     check(archive, target)
     return archive
-
-
-def source_time() -> datetime:
-    """Return the time that everything in a zip states: SOURCE_DATE_EPOCH, or that of the last
-    commit.
-    """
-    stated = os.environ.get("SOURCE_DATE_EPOCH", "")
-    if not stated:
-        command = ["git", "-C", str(ROOT), "log", "-1", "--format=%ct"]
-        try:
-            stated = subprocess.run(
-                command, capture_output=True, text=True, check=False
-            ).stdout.strip()
-        except OSError:  # there is no git
-            stated = ""
-    return datetime.fromtimestamp(max(int(stated or 0), _OLDEST), UTC)
 
 
 def write_zip(folder: Path, archive: Path, made: datetime) -> None:

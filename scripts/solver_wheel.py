@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import base64
 import hashlib
+import importlib.util
 import os
 import re
 import shutil
@@ -22,7 +23,7 @@ import zipfile
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from build_extension import source_time
+from source_time import source_time
 
 ROOT = Path(__file__).resolve().parent.parent
 CODE = ROOT / "build" / "solver_code"
@@ -36,6 +37,7 @@ ASSETS = (
     "assets/prior/README.md",
     "assets/prior/joint_prior.npz",
 )
+NEEDS = ("numpy", "numba")
 # Optional extras, and the package that each needs for the examples of docs/solver_api.md.
 EXTRAS = {"jax": "jax", "torch": "torch"}
 DOCUMENTATION = "../docs/"  # what the README links to, which a wheel does not have
@@ -101,6 +103,11 @@ def main() -> int:
     parser.add_argument("--code", type=Path, default=CODE, help="folder of machine code")
     parser.add_argument("--code-only", action="store_true", help="make no wheel")
     arguments = parser.parse_args()
+    if missing := [name for name in NEEDS if importlib.util.find_spec(name) is None]:
+        raise SystemExit(
+            f"solver_wheel: {sys.executable} has no {' and no '.join(missing)}, with which the "
+            f"solver is compiled: {sys.executable} -m pip install {' '.join(NEEDS)}"
+        )
     digest = sources_digest()
     compile_code(arguments.code, digest)
     if not arguments.code_only:

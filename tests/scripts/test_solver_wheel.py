@@ -117,3 +117,11 @@ def test_it_works_without_the_rest_of_scope(wheel, tmp_path):
     command = [sys.executable, "-c", LOAD, str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_python_without_packages_says_what_it_needs():
+    command = [sys.executable, "-I", "-S", str(ROOT / "scripts" / "solver_wheel.py")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"solver_wheel: {sys.executable} has no numpy and no numba")
+    assert done.stderr.count("\n") == 1
