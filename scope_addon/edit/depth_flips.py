@@ -99,7 +99,7 @@ def _limb(body: Body, part: str) -> tuple[int, int, int]:
 
 def _turned_around(clip: Clip, body: Body, centers: Float64Array) -> Float64Array:
     """Return the rotations (T, K+1, 3, 3) of a body that is mirrored in depth."""
-    names = list(body.joint_names)
+    names = body.joint_names
     opposite = [names.index(other_side(name)) for name in names]
     sight = unit(clip.root - centers)
     level = sight - (sight @ UP)[:, None] * UP

@@ -152,7 +152,7 @@ class PoseRefit:
         self.betas = np.asarray(betas, float)
         self.skin = FootSkin(body, betas)
         self.body, self._skin_points = self.skin.as_keypoints(with_contact_points(body, betas))
-        self.names = list(body.joint_names)
+        self.names = body.joint_names
         self._tree = with_fixed_shape(make_tree(self.body), self.betas)
         self._options = _options()
         self._points = len(self.body.keypoint_names)

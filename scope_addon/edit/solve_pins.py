@@ -155,7 +155,7 @@ def missed(clip: Clip, body: Body, betas: FloatArray, pin: Pin, shot: Shot) -> f
     :param betas: (P,) shape coefficients.
     """
     at = sample(clip, np.array([shot.time(pin.frame)]))
-    where = at.joints(body, betas)[0, list(body.joint_names).index(pin.joint)]
+    where = at.joints(body, betas)[0, body.joint_names.index(pin.joint)]
     return distance_to(pin, where, shot.camera(pin.frame))
 
 
@@ -556,7 +556,7 @@ def lowest_skin(clip: Clip, body: Body, betas: FloatArray, joint: str) -> Float6
 
     :param betas: (P,) shape coefficients.
     """
-    names = list(body.joint_names)
+    names = body.joint_names
     found = {joint}
     if joint == "pelvis":
         found |= {"left_hip", "right_hip"}

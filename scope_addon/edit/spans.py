@@ -80,7 +80,7 @@ def swap_sides(clip: Clip, body: Body, start: float, end: float, limbs: str = "b
     :raises UsageError: no key is in the span.
     """
     span = keys_within(clip, start, end)
-    names = list(body.joint_names)
+    names = body.joint_names
     out = clip.copy()
     for kind in _kinds_of_limbs(limbs):
         turn = _HALF_ABOUT_Z if kind == "arms" else np.eye(3)
@@ -117,7 +117,7 @@ def _kinds_of_limbs(limbs: str) -> tuple[str, ...]:
 
 def _pairs_of_joints(body: Body, kind: str) -> list[tuple[int, int]]:
     """Return the left and the right one of each joint of the arms or the legs."""
-    names = list(body.joint_names)
+    names = body.joint_names
     pairs = []
     for left, name in enumerate(names):
         bare = name.removeprefix("left_")

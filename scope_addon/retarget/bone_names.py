@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the names of bones say: side, and the word that tells the body part, in the spellings of
-common tools.
+common tools; and the names by which other programs recognize a skeleton.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ import re
 import unicodedata
 from collections import Counter
 from dataclasses import dataclass
+
+from .bone_map import FINGERS, SIDED_PARTS, SPINE
 
 _LATIN_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[぀-ヿ㐀-鿿々ー]+")
 _SIDES = {"l": "left", "left": "left", "lft": "left"}
@@ -62,6 +64,24 @@ LIMBS = {
 }
 _LIMB_WORDS = {word for words in LIMBS.values() for word in words}
 
+_TRUNK = ("pelvis", *SPINE, "neck", "head")
+OWN = "scope"  # the names of the body's own joints
+SKELETONS = (OWN, "mixamo", "ue5", "vrm", "unity")
+# Names of the centre, and of the sides without what tells them apart.
+_MIXAMO = (
+    ("Hips", "Spine", "Spine1", "Spine2", "Neck", "Head"),
+    ("UpLeg", "Leg", "Foot", "ToeBase", "Shoulder", "Arm", "ForeArm", "Hand"),
+)
+_UE5 = (
+    ("pelvis", "spine_01", "spine_02", "spine_03", "neck_01", "head"),
+    ("thigh", "calf", "foot", "ball", "clavicle", "upperarm", "lowerarm", "hand"),
+)
+_UNITY = (
+    ("Hips", "Spine", "Chest", "UpperChest", "Neck", "Head"),
+    ("UpperLeg", "LowerLeg", "Foot", "Toes", "Shoulder", "UpperArm", "LowerArm", "Hand"),
+)
+_PHALANGES = ("Proximal", "Intermediate", "Distal")
+
 
 @dataclass(frozen=True)
 class BoneName:
@@ -113,3 +133,44 @@ def _parsed(name: str, words: list[str]) -> BoneName:
                 core = rest
                 break
     return BoneName(core, side, is_goal, is_fk)
+
+
+def bone_names(skeleton: str) -> dict[str, str]:
+    """Return the names of a skeleton's bones by the body's joints.
+
+    :param skeleton: one of ``SKELETONS``, except the body's own.
+    """
+    centre, sided = {"mixamo": _MIXAMO, "ue5": _UE5}.get(skeleton, _UNITY)
+    names = {part: _spelled(skeleton, "", name) for part, name in zip(_TRUNK, centre, strict=True)}
+    for side in ("left", "right"):
+        for part, name in zip(SIDED_PARTS, sided, strict=True):
+            names[f"{side}_{part}"] = _spelled(skeleton, side, name)
+        for finger in FINGERS:
+            for k in (1, 2, 3):
+                names[f"{side}_{finger}{k}"] = _phalanx(skeleton, side, finger, k)
+        # The middle of the hand, in bodies without fingers.
+        names[f"{side}_hand"] = names[f"{side}_middle1"]
+    return names
+
+
+def _spelled(skeleton: str, side: str, name: str) -> str:
+    """Return a bone's name with its side."""
+    if skeleton == "mixamo":
+        return f"mixamorig:{side.title()}{name}"
+    if skeleton == "ue5":
+        return f"{name}_{side[0]}" if side else name
+    whole = side.title() + name
+    return whole if skeleton == "unity" else whole[0].lower() + whole[1:]
+
+
+def _phalanx(skeleton: str, side: str, finger: str, k: int) -> str:
+    """Return the name of a finger's k-th bone from the knuckle on, of a thumb from the palm on."""
+    if skeleton == "mixamo":
+        return _spelled(skeleton, side, f"Hand{finger.title()}{k}")
+    if skeleton == "ue5":
+        return _spelled(skeleton, side, f"{finger}_{k:02d}")
+    phalanges = _PHALANGES
+    if finger == "thumb" and skeleton == "vrm":
+        phalanges = ("Metacarpal", "Proximal", "Distal")
+    whole = "Little" if finger == "pinky" else finger.title()
+    return _spelled(skeleton, side, whole + phalanges[k - 1])

@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays import Float64Array
 from ..kinematics.mirrored_limbs import OTHER_SIDE, other_side
 from .bone_map import FINGERS, PHALANGES, SPINE, BoneMap
-from .bone_names import CENTRE, LIMBS, BoneName, parse_names
+from .bone_names import CENTRE, LIMBS, BoneName, bone_names, parse_names
 from .fingers import find_fingers
 from .rest_pose import RestPose, faces_backwards, rest_faults
 
@@ -41,11 +41,6 @@ _MAX_COLLAR = 0.4
 _NEAR = 0.005
 # The tip of a head is above it by more than this multiple of the neck's bones.
 _TIP_LENGTH = 1.4
-# The humanoid table of VRM files, which other formats of avatars share.
-_VRM_LIMBS = {
-    "UpperLeg": "hip", "LowerLeg": "knee", "Foot": "ankle", "Toes": "foot",
-    "Shoulder": "collar", "UpperArm": "shoulder", "LowerArm": "elbow", "Hand": "wrist",
-}  # fmt: skip
 
 
 def guess(rest: RestPose, *, is_mirrored: bool = False) -> BoneMap:
@@ -101,20 +96,16 @@ def from_humanoid(table: Mapping[str, str], names: list[str]) -> BoneMap:
 
 def _vrm_parts(table: Mapping[str, str]) -> dict[str, str]:
     """Return the body part of each of VRM's parts that the table has, except the spine."""
-    found = {"hips": "pelvis", "neck": "neck", "head": "head"}
+    found = {
+        name: part
+        for part, name in bone_names("vrm").items()
+        if part not in SPINE and not part.endswith("_hand")
+    }
     # Version 1 counts a thumb from its metacarpal, version 0 from the proximal phalanx.
-    thumb = ("Proximal", "Intermediate", "Distal")
-    if "leftThumbMetacarpal" in table or "rightThumbMetacarpal" in table:
-        thumb = ("Metacarpal", "Proximal", "Distal")
-    for side in ("left", "right"):
-        found |= {f"{side}{vrm}": f"{side}_{part}" for vrm, part in _VRM_LIMBS.items()}
-        for finger in FINGERS:
-            vrm_finger = "Little" if finger == "pinky" else finger.title()
-            phalanges = thumb if finger == "thumb" else ("Proximal", "Intermediate", "Distal")
-            found |= {
-                f"{side}{vrm_finger}{phalanx}": f"{side}_{finger}{k}"
-                for k, phalanx in enumerate(phalanges, 1)
-            }
+    if "leftThumbMetacarpal" not in table and "rightThumbMetacarpal" not in table:
+        for side in ("left", "right"):
+            for k, phalanx in enumerate(("Proximal", "Intermediate", "Distal"), 1):
+                found[f"{side}Thumb{phalanx}"] = f"{side}_thumb{k}"
     return {vrm: part for vrm, part in found.items() if vrm in table}
 
 

@@ -297,7 +297,7 @@ def _without_unseen_hands(bone_map: BoneMap, body: Body, clip: Clip) -> BoneMap:
     """Return the bone map without the fingers of hands that were not captured: theirs are at rest
     in every frame.
     """
-    names = list(body.joint_names)
+    names = body.joint_names
     kept = set(names)
     for side in ("left", "right"):
         fingers = {f"{side}_{phalanx}" for phalanx in PHALANGES}.intersection(names)

@@ -166,7 +166,7 @@ def pinned_places(
         np.array([shot.time(pin.frame) for pin in pins]),
     )
     joints = at.joints(body, motion.betas)
-    return {pin: joints[k, list(body.joint_names).index(pin.joint)] for k, pin in enumerate(pins)}
+    return {pin: joints[k, body.joint_names.index(pin.joint)] for k, pin in enumerate(pins)}
 
 
 def _meet_pin(armature: Object, body: Body, rate: float, motion: Motion, pin: Pin) -> None:

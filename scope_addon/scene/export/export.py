@@ -27,6 +27,7 @@ from ...errors import OutputError, UsageError
 from ...motion import Motion
 from ...notices import Notice, notice
 from ...output_paths import WITHOUT_SCENE, check_output, person_paths
+from ...retarget.bone_names import OWN, SKELETONS, bone_names
 from ...temporary import remove
 from .. import actions
 from ..budget import check_samples
@@ -34,7 +35,6 @@ from ..build import NEW_SCENE, BuildOptions, build_scene, check_choices
 from ..datablocks import captures_of, modifiers_off, temporary_datablocks
 from ..packed_motion import pack_motion
 from . import formats
-from .bone_names import OWN, SKELETONS, bone_names
 from .bvh import UNITS_PER_METRE
 from .export_states import (
     actions_over_scene_range,

@@ -18,7 +18,7 @@ import numpy as np
 from ...arrays import Float64Array
 from ...kinematics.axes import R_WORLD_MODEL
 from ...motion import Motion
-from .bone_names import bone_names
+from ...retarget.bone_names import bone_names
 
 if TYPE_CHECKING:
     from ....solver.body import Body
