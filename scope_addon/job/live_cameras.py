@@ -49,7 +49,7 @@ _INTERVAL_S = 0.02
 
 
 @dataclass(frozen=True)
-class Camera:
+class ListedCamera:
     """A camera: its number, its name as it tells it, and what it offers, such as ``MJPG
     1920×1080``.
     """
@@ -66,11 +66,11 @@ class Camera:
         )
 
 
-def list_cameras() -> list[Camera]:
+def list_cameras() -> list[ListedCamera]:
     """Return the cameras in the order of their numbers; what cannot be read is left out."""
     if not sys.platform.startswith("linux"):
         return [
-            Camera(number, _shown(name))
+            ListedCamera(number, _shown(name))
             for number, name in enumerate(camera_names(sys.platform)[:_MAX_CAMERAS])
         ]
     with suppress(OSError):
@@ -84,7 +84,7 @@ def list_cameras() -> list[Camera]:
     return []
 
 
-def camera_with_formats(source: str) -> Camera:
+def camera_with_formats(source: str) -> ListedCamera:
     """Return a camera with its formats, for which it is opened on Windows and macOS: not in
     Blender's process.
 
@@ -100,7 +100,7 @@ def camera_with_formats(source: str) -> Camera:
             f"camera {number} does not exist; connect a camera, or choose a stream or a file"
         )
     name, modes = camera_with_modes(number, sys.platform)
-    return Camera(
+    return ListedCamera(
         number, _shown(name), tuple(_shown(text) for text in described(modes)[:_MAX_FORMATS])
     )
 
@@ -118,7 +118,7 @@ def camera_number(source: str) -> int:
     return int(source.removeprefix("/dev/video"))
 
 
-def _camera(number: int) -> Camera | None:
+def _camera(number: int) -> ListedCamera | None:
     """Return a camera; None for a node that gives no pictures, such as that of a camera's
     metadata.
     """
@@ -137,7 +137,7 @@ def _camera(number: int) -> Camera | None:
             formats = tuple(_formats(node))
         finally:
             os.close(node)
-    return Camera(number, shown, formats)
+    return ListedCamera(number, shown, formats)
 
 
 def _ask(node: int, request: int, answer: bytearray) -> None:
@@ -223,14 +223,14 @@ class FormatsProcess(WorkerProcess):
         self._began_s = time.monotonic()
         super().__init__(FormatsRequest(source), job_folder, None, python, script)
 
-    def answer(self) -> Camera | None:
+    def answer(self) -> ListedCamera | None:
         """Return the camera with its formats; None as long as there is no answer.
 
         :raises WorkerFailedError: there will be none.
         """
         for message in self.poll():
             if message["event"] == "result":
-                return Camera(
+                return ListedCamera(
                     camera_number(self.source), message["name"], tuple(message["formats"])
                 )
         if time.monotonic() - self._began_s > ANSWER_S:
@@ -247,7 +247,7 @@ class FormatsProcess(WorkerProcess):
         )
 
 
-def ask_for_formats(text: str) -> Camera:
+def ask_for_formats(text: str) -> ListedCamera:
     """Return a camera with its formats, waiting for the answer.
 
     :param text: number or device.

@@ -38,7 +38,7 @@ SAME_UP_COS = np.cos(np.radians(1.0))
 
 
 @dataclass(frozen=True)
-class Calibration:
+class LiveCalibration:
     """What all frames share: camera, shape, and the world as up direction, height and horizontal
     position.
     """
@@ -55,14 +55,16 @@ class Calibration:
         T[:3, 3] = self.camera_position
         return T
 
-    def interpolated(self, target: Calibration, share: float, share_of_world: float) -> Calibration:
+    def interpolated(
+        self, target: LiveCalibration, share: float, share_of_world: float
+    ) -> LiveCalibration:
         """Return the calibration that lies between this one and another.
 
         :param share: of the way to the other one, 0..1, for focal length (its logarithm) and shape.
         :param share_of_world: the same for the world.
         """
         up = self.up + share_of_world * (target.up - self.up)
-        return Calibration(
+        return LiveCalibration(
             _between(self.camera, target.camera, share),
             self.betas + share * (target.betas - self.betas),
             up / np.linalg.norm(up),
@@ -89,11 +91,11 @@ class GradualCalibration:
     :param settling_s: s.
     """
 
-    def __init__(self, start: Calibration, settling_s: float) -> None:
+    def __init__(self, start: LiveCalibration, settling_s: float) -> None:
         self._stages = [start] * STAGES
         self._settling_s = settling_s
 
-    def step(self, target: Calibration, step_s: float, world_s: float) -> Calibration:
+    def step(self, target: LiveCalibration, step_s: float, world_s: float) -> LiveCalibration:
         """Let time pass, and return the calibration.
 
         :param target: the newest estimate.
@@ -143,7 +145,7 @@ class Calibrator:
 
     def estimate(
         self, times_s: Sequence[float], observations: Sequence[Observation]
-    ) -> Calibration:
+    ) -> LiveCalibration:
         """Estimate everything from all observations so far, at least one."""
         if self._given.focal_deviation > 0.0:
             assumed = assumed_camera(*self._size, self._longer_px)
@@ -160,10 +162,12 @@ class Calibrator:
         prepared = prepare_track(self._body, track, camera, height_m=self._height_m)
         fitted = fit_track(prepared, lambda *_: None)
         return self._with_world(
-            Calibration(camera, fitted.betas, np.zeros(3), np.zeros(3)), track, fitted
+            LiveCalibration(camera, fitted.betas, np.zeros(3), np.zeros(3)), track, fitted
         )
 
-    def follow(self, calibration: Calibration, track: Track, fitted: FittedTrack) -> Calibration:
+    def follow(
+        self, calibration: LiveCalibration, track: Track, fitted: FittedTrack
+    ) -> LiveCalibration:
         """Estimate the floor's inclination and height again, from the last seconds.
 
         The horizontal position stays: nothing in the picture says where the origin was. Small
@@ -179,8 +183,8 @@ class Calibrator:
         return replace(calibration, up=found.up, camera_position=position)
 
     def _with_world(
-        self, calibration: Calibration, track: Track, fitted: FittedTrack
-    ) -> Calibration:
+        self, calibration: LiveCalibration, track: Track, fitted: FittedTrack
+    ) -> LiveCalibration:
         """Add the world: as offline where no lines tell which way is up, otherwise with their
         direction.
         """

@@ -18,7 +18,7 @@ from ..capture.media.frame import Frame
 from ..capture.perception.observation import Observation
 from ..capture.tracking.track import track_of
 from ..kinematics.axes import transform_points
-from .calibration import Calibration, Calibrator, GradualCalibration
+from .calibration import Calibrator, GradualCalibration, LiveCalibration
 from .causal_fit import CausalFit, FittedFrame, Support
 from .feet import FootHold
 from .left_right import CausalLeftRight
@@ -39,14 +39,16 @@ HOLD_S = 0.5  # for which the pose of a person who is not seen is held, rather t
 # for which somebody who stood on the floor and is not seen is still not below it
 FLOOR_MEMORY_S = 2.0
 
-Start = Callable[..., "Future[Calibration]"]
+Start = Callable[..., "Future[LiveCalibration]"]
 
 
-def start_at_once(function: Callable[..., Calibration], *args: object) -> Future[Calibration]:
+def start_at_once(
+    function: Callable[..., LiveCalibration], *args: object
+) -> Future[LiveCalibration]:
     """Call a function as an executor would, but before returning: results do not depend on the
     speed of threads.
     """
-    future: Future[Calibration] = Future()
+    future: Future[LiveCalibration] = Future()
     future.set_result(function(*args))
     return future
 
@@ -78,8 +80,8 @@ class _Estimates:
 
     fit: CausalFit
     gradual: GradualCalibration
-    current: Calibration  # by which poses are given
-    target: Calibration  # the newest estimate, which `current` approaches
+    current: LiveCalibration  # by which poses are given
+    target: LiveCalibration  # the newest estimate, which `current` approaches
 
 
 class LiveSession:
@@ -113,7 +115,7 @@ class LiveSession:
         self._feet = FootHold(body)
         self._left_right = CausalLeftRight(wait=executor is None)
         self._known: _Estimates | None = None  # None before the person was seen
-        self._pending: Future[Calibration] | None = None
+        self._pending: Future[LiveCalibration] | None = None
         self._seen: deque[_Seen] = deque()
         # from which time is counted, later by pauses
         self._first_s = -np.inf
@@ -227,7 +229,7 @@ class LiveSession:
         if not np.array_equal(known.current.betas, before.betas):
             known.fit.set_shape(known.current.betas)
 
-    def _in_first_persons_world(self, calibration: Calibration) -> Calibration:
+    def _in_first_persons_world(self, calibration: LiveCalibration) -> LiveCalibration:
         """Return the calibration with camera and world of the person from whom they are taken, if
         there is one.
         """
@@ -285,7 +287,7 @@ class LiveSession:
         return None if self._known is None else self._known.current.camera
 
     def _pose(
-        self, now: Calibration, frame: Frame, observation: Observation, fitted: FittedFrame
+        self, now: LiveCalibration, frame: Frame, observation: Observation, fitted: FittedFrame
     ) -> LivePose:
         time_s = frame.timestamp_s
         T = now.T_world_camera
@@ -335,7 +337,7 @@ class LiveSession:
         state = State.rest(self._body.K, self._body.P)
         rotations = rotations_of(state)
         height = float(body.stature(state.beta)) / 2
-        level = Calibration(
+        level = LiveCalibration(
             Camera(np.eye(3), np.zeros(5), ""),
             state.beta,
             np.array([0, -1.0, 0]),

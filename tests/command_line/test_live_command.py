@@ -19,7 +19,7 @@ from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line import signals
 from scope.scope_addon.job import live_cameras
-from scope.scope_addon.job.live_cameras import Camera
+from scope.scope_addon.job.live_cameras import ListedCamera
 from scope.scope_addon.live.people import LivePeople
 from scope.scope_addon.live.smoothing import DELAY_S
 from scope.scope_addon.live.vmc import BONES
@@ -85,7 +85,7 @@ def test_what_is_wrong_is_said_in_one_sentence(
 
 
 def test_the_formats_of_a_camera_are_told_without_opening_it_as_a_source(capfd, monkeypatch):
-    told = Camera(2, "USB Camera", ("mjpeg 1280×720",))
+    told = ListedCamera(2, "USB Camera", ("mjpeg 1280×720",))
     monkeypatch.setattr(live_cameras, "ask_for_formats", lambda source: {"2": told}[source])
     assert main(["live", "2", "--list-formats"]) == 0
     assert capfd.readouterr().err == "scope: 2: USB Camera (mjpeg 1280×720)\n"

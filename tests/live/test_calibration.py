@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera
-from scope.scope_addon.live.calibration import Calibration, GradualCalibration
+from scope.scope_addon.live.calibration import GradualCalibration, LiveCalibration
 from scope.scope_addon.live.session import SETTLED_S, SETTLING_S
 
 
 def calibration(height_m=1.2, tilt=0.0, focal_px=1000.0, beta=0.0):
     camera = Camera(np.diag([focal_px, focal_px, 1.0]), np.zeros(5), "")
     up = np.array([0.0, -np.cos(tilt), np.sin(tilt)])
-    return Calibration(camera, np.full(3, beta), up, np.array([0.0, 0.0, height_m]))
+    return LiveCalibration(camera, np.full(3, beta), up, np.array([0.0, 0.0, height_m]))
 
 
 BEFORE = calibration(1.0)

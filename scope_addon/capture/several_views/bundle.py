@@ -115,7 +115,7 @@ class Given:
 
 
 @dataclass(frozen=True)
-class Bundle:
+class AdjustedCameras:
     """Adjusted cameras, the cost, and how many keypoints at least two cameras see."""
 
     cameras: list[CameraPlace]
@@ -154,7 +154,7 @@ def adjust(
     times: Float64Array,
     given: Sequence[Given],
     mean_lengths: Float64Array,
-) -> Bundle:
+) -> AdjustedCameras:
     """Adjust cameras to what they see of one person.
 
     :param people: the person as each of the V cameras sees them.
@@ -436,7 +436,7 @@ class _Problem:
         both = (later.seen & earlier.seen)[:, None, None]
         return np.where(both, (later.rays - earlier.rays) / (2.0 * half), 0.0)
 
-    def result(self, now: _Unknowns, cost: float) -> Bundle:
+    def result(self, now: _Unknowns, cost: float) -> AdjustedCameras:
         """Return cameras with their deviations."""
         count = len(now.cameras)
         sigmas = self.linearize(now).sigmas()[: count * _UNKNOWNS].reshape(count, _UNKNOWNS)
@@ -451,7 +451,7 @@ class _Problem:
             )
             for place, sigma in zip(now.cameras, sigmas, strict=True)
         ]
-        return Bundle(cameras, cost, int((confidence > 0).any(axis=0).sum()))
+        return AdjustedCameras(cameras, cost, int((confidence > 0).any(axis=0).sum()))
 
 
 def image_residual(

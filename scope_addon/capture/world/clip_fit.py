@@ -65,8 +65,8 @@ def fit_clip(
     :return: the states in each frame's camera; those of invalid frames are as given.
     """
     clip = _Clip(prepared, start, path, progress)
-    for run in runs(start.valid, prepared.track.times):
-        for window in windows(
+    for run in frames_between_gaps(start.valid, prepared.track.times):
+        for window in overlapping_slices(
             len(run), _frames_of(prepared, WINDOW_UNKNOWNS), _frames_of(prepared, OVERLAP)
         ):
             clip.fit(run[window])
@@ -153,7 +153,7 @@ class _Clip:
         return sigma
 
 
-def runs(valid: BoolArray, times: Float64Array) -> Iterator[IndexArray]:
+def frames_between_gaps(valid: BoolArray, times: Float64Array) -> Iterator[IndexArray]:
     """Yield the valid frames between gaps in which too much can happen for acceleration to tell it.
 
     :param valid: (T,).
@@ -166,7 +166,7 @@ def runs(valid: BoolArray, times: Float64Array) -> Iterator[IndexArray]:
         yield from np.split(frames, np.flatnonzero(gaps) + 1)
 
 
-def windows(count: int, most: int, overlap: int) -> list[slice]:
+def overlapping_slices(count: int, most: int, overlap: int) -> list[slice]:
     """Divide ``count`` frames into as few slices of at most ``most`` as overlap by ``overlap``, all
     of one length.
     """

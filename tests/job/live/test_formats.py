@@ -10,7 +10,12 @@ import textwrap
 import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job import live_cameras
-from scope.scope_addon.job.live_cameras import Camera, FormatsProcess, ask_for_formats, list_cameras
+from scope.scope_addon.job.live_cameras import (
+    FormatsProcess,
+    ListedCamera,
+    ask_for_formats,
+    list_cameras,
+)
 from scope.scope_addon.job.process import WorkerFailedError
 from scope.scope_addon.job.request import FormatsRequest
 
@@ -50,7 +55,7 @@ def test_the_answer_is_a_camera(asking):
     process = asking(f"assert asked == {{'formats_of': '2'}}; print(json.dumps({ANSWER!r}))")
     found = []
     wait_for(lambda: found.append(process.answer()) or found[-1])
-    assert found[-1] == Camera(2, "USB Camera", ("mjpeg 1280×720",))
+    assert found[-1] == ListedCamera(2, "USB Camera", ("mjpeg 1280×720",))
 
 
 def test_a_camera_that_does_not_answer_is_given_up(asking, monkeypatch):

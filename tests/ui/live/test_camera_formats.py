@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import bpy
 import pytest
 from scope.scope_addon.job import live_cameras
-from scope.scope_addon.job.live_cameras import Camera
+from scope.scope_addon.job.live_cameras import ListedCamera
 from scope.scope_addon.ui import live_operators, live_properties
 from scope.scope_addon.ui.live_operators import end_live
 from scope.scope_addon.ui.live_properties import state
@@ -65,7 +65,7 @@ def drawn():
 
 def test_the_answer_is_shown_and_completes_the_list(answering, monkeypatch):
     answering(f"assert asked == {{'formats_of': '1'}}; print(json.dumps({ANSWER!r}))")
-    listed = [Camera(0, "Front"), Camera(1, "USB Camera")]
+    listed = [ListedCamera(0, "Front"), ListedCamera(1, "USB Camera")]
     monkeypatch.setattr(live_cameras, "list_cameras", lambda: listed)
     assert live_properties._cameras(None, None, "usb") == ["1: USB Camera"]
     ask()
@@ -73,7 +73,7 @@ def test_the_answer_is_shown_and_completes_the_list(answering, monkeypatch):
     assert drawn() == "1: USB Camera (mjpeg 1280×720)"
     bpy.context.scene.scope_live.camera = "0"
     assert drawn() == ""
-    listed[1] = Camera(1, "Other Camera")  # plugged in instead
+    listed[1] = ListedCamera(1, "Other Camera")  # plugged in instead
     assert live_properties._cameras(None, None, "1") == ["1: Other Camera"]
 
 

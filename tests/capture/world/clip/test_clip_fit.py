@@ -172,9 +172,9 @@ def test_windows_agree_with_the_whole_and_join_smoothly(monkeypatch):
 
 
 def test_windows_cover_all_frames_and_overlap():
-    assert clip_fit.windows(100, 100, 20) == [slice(0, 100)]
+    assert clip_fit.overlapping_slices(100, 100, 20) == [slice(0, 100)]
     for count, most, overlap in ((101, 100, 20), (1000, 320, 64), (1001, 320, 64), (7, 5, 1)):
-        found = clip_fit.windows(count, most, overlap)
+        found = clip_fit.overlapping_slices(count, most, overlap)
         assert found[0].start == 0
         assert found[-1].stop == count
         # no more than is needed
@@ -190,11 +190,13 @@ def test_longer_gaps_separate_what_is_fitted_together():
     # 0.17 s and 0.7 s
     valid[10:14] = False
     valid[30:50] = False
-    first, second = clip_fit.runs(valid, times)
+    first, second = clip_fit.frames_between_gaps(valid, times)
     assert first.tolist() == [*range(10), *range(14, 30)]
     assert second.tolist() == [*range(50, 60)]
-    assert list(clip_fit.runs(np.zeros(3, bool), times[:3])) == []
-    (slow,) = clip_fit.runs(np.ones(4, bool), np.arange(4.0))  # one frame a second has no gaps
+    assert list(clip_fit.frames_between_gaps(np.zeros(3, bool), times[:3])) == []
+    (slow,) = clip_fit.frames_between_gaps(
+        np.ones(4, bool), np.arange(4.0)
+    )  # one frame a second has no gaps
     assert len(slow) == 4
 
 
