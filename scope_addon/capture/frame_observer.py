@@ -227,9 +227,9 @@ class FrameObserver:
                 frame.image_rgb,
                 time_s,
                 [person.keypoints_px for person in people],
-                is_cut,
-                is_anchor,
-                is_shared,
+                is_cut=is_cut,
+                is_sampled=is_anchor,
+                is_shared=is_shared,
             )
         return sorted(people, key=lambda person: -person.region.side_px)
 

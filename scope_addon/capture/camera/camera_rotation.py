@@ -84,6 +84,7 @@ class BackgroundTracker:
         image_rgb: Uint8Array,
         time_s: float,
         people: Sequence[NDArray[Any]],
+        *,
         is_cut: bool = False,
         is_sampled: bool = False,
         is_shared: bool = False,

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -109,6 +110,15 @@ class _DetectedBody:
         """Return whether the other one covers this one, and its keypoints are more spread out."""
         share = share_within(self.estimate, other.estimate)
         return share > MAX_SHARE_WITHIN and self.estimate.spread < other.estimate.spread
+
+
+class _Sighting(NamedTuple):
+    """The estimate of somebody who is tracked, in the next frame."""
+
+    target: TrackedTarget
+    estimate: PoseEstimate
+    is_swapped: bool  # whether left and right are, since the frame before
+    innovation: float  # see `TrackedTarget.innovation`
 
 
 class PeopleTracker:
@@ -251,20 +261,22 @@ class PeopleTracker:
         self._lost = [lost for lost in self._lost if self._clock.is_within(MEMORY_S, lost.seen_s)]
         found = self._estimator.estimate_live(image_rgb, upcoming_rgb, self._live)
         checked = [
-            self._with_fallback(image_rgb, f, e) for f, e in zip(self._live, found, strict=True)
+            self._with_fallback(image_rgb, target, estimate)
+            for target, estimate in zip(self._live, found, strict=True)
         ]
         seen = []
-        for f, (e, swap) in zip(self._live, checked, strict=True):
-            f.is_occluded = e is not None and f.becomes_occluded(e)
-            if e is not None and not f.is_occluded:
-                seen.append((f, e, swap, f.innovation(e)))
+        for target, (estimate, is_swapped) in zip(self._live, checked, strict=True):
+            target.is_occluded = estimate is not None and target.becomes_occluded(estimate)
+            if estimate is not None and not target.is_occluded:
+                innovation = target.innovation(estimate)
+                seen.append(_Sighting(target, estimate, is_swapped, innovation))
         # Two targets on one body: one person went behind another. The body belongs to the target
         # with the smaller innovation; if these are similar, a target that was found just now was a
         # mistake.
-        seen.sort(key=lambda entry: (entry[3] > MAX_INNOVATION, entry[3] + self._novelty(entry[0])))
+        seen.sort(key=self._doubt)
         kept: list[TrackedTarget] = []
         accepted: list[PoseEstimate] = []
-        for target, estimate, swapped, innovation in seen:
+        for target, estimate, is_swapped, innovation in seen:
             if any(is_same_body(estimate, other) for other in accepted):
                 continue
             accepted.append(estimate)
@@ -272,7 +284,7 @@ class PeopleTracker:
                 kept.append(self._start(estimate))
                 self._lose(target)
             else:
-                target.update(estimate, swapped, self._clock.time_s, self._clock.step_s)
+                self._update(target, estimate, is_swapped)
                 kept.append(target)
         for target in self._live:
             if target in kept or target in self._lost:
@@ -281,8 +293,7 @@ class PeopleTracker:
             if behind is None:
                 self._lose(target)
             else:
-                swapped = looks_swapped(target.estimate, behind)
-                target.update(behind, swapped, self._clock.time_s, self._clock.step_s)
+                self._update(target, behind, looks_swapped(target.estimate, behind))
                 kept.append(target)
         self._live = sorted(kept, key=lambda f: f.tracklet)
 
@@ -329,11 +340,15 @@ class PeopleTracker:
             if estimate is not None and not _is_tracked(estimate, self._live):
                 self._live.append(self._start(estimate))
 
-    def _novelty(self, target: TrackedTarget) -> float:
-        """Return a value that falls from NOVELTY_INNOVATION to 0 while a person becomes
-        established.
+    def _doubt(self, seen: _Sighting) -> tuple[bool, float]:
+        """Return what grows with the doubt whether a body is a target's: being new counts as
+        NOVELTY_INNOVATION, and less and less while a person becomes established.
         """
-        return NOVELTY_INNOVATION * (1 - min(target.tracked_s / ESTABLISHED_S, 1.0))
+        novelty = NOVELTY_INNOVATION * (1 - min(seen.target.tracked_s / ESTABLISHED_S, 1.0))
+        return seen.innovation > MAX_INNOVATION, seen.innovation + novelty
+
+    def _update(self, target: TrackedTarget, estimate: PoseEstimate, is_swapped: bool) -> None:
+        target.update(estimate, is_swapped, self._clock.time_s, self._clock.step_s)
 
     def _with_fallback(
         self, image_rgb: Uint8Array, target: TrackedTarget, estimate: PoseEstimate | None
@@ -548,9 +563,7 @@ class PeopleTracker:
 
     def _resume(self, lost: TrackedTarget, estimate: PoseEstimate) -> None:
         """Continue the tracklet of a lost person who was found again."""
-        lost.update(
-            estimate, looks_swapped(lost.estimate, estimate), self._clock.time_s, self._clock.step_s
-        )
+        self._update(lost, estimate, looks_swapped(lost.estimate, estimate))
         lost.frames_lost = 0
         self._lost.remove(lost)
         self._live.append(lost)
