@@ -25,6 +25,8 @@ from ..kinematics.smoothing import (
 )
 from ..motion import Motion
 
+_HEADING_CUTOFF_HZ = 1.0  # Low enough to remove the rotation of the hips with each step.
+
 
 @dataclass
 class Clip:
@@ -137,9 +139,6 @@ def band_limited(clip: Clip, rate: float) -> Clip:
     if 1.0 / rate <= 1.5 * step:
         return clip
     return Clip(clip.times, smooth_rotations(clip.rotations, clip.times, 0.45 * rate), clip.root)
-
-
-_HEADING_CUTOFF_HZ = 1.0  # Low enough to remove the rotation of the hips with each step.
 
 
 def floor_trajectory(clip: Clip, *, heading: bool = True) -> tuple[Float64Array, Float64Array]:

@@ -50,6 +50,16 @@ if TYPE_CHECKING:
     from ..edit.clip import Clip
     from ..edit.corrections import Correction
     from ..motion import Motion
+_ICONS = {
+    "PIN": "PINNED",
+    "CONTACT": "SNAP_FACE",
+    "EXCHANGE": "MOD_MIRROR",
+    "FLIP": "ARROW_LEFTRIGHT",
+    "UPRIGHT": "EMPTY_SINGLE_ARROW",
+    "FLOOR": "GRID",
+    "INTERPOLATION": "IPO_EASE_IN_OUT",
+    "FEET": "TRIA_DOWN_BAR",
+}
 
 
 class SCOPE_PT_edit(PersonTab, Panel):
@@ -472,18 +482,6 @@ def _correctable_motion(armature: Object) -> Motion | None:
     except ScopeError:
         return None
     return motion
-
-
-_ICONS = {
-    "PIN": "PINNED",
-    "CONTACT": "SNAP_FACE",
-    "EXCHANGE": "MOD_MIRROR",
-    "FLIP": "ARROW_LEFTRIGHT",
-    "UPRIGHT": "EMPTY_SINGLE_ARROW",
-    "FLOOR": "GRID",
-    "INTERPOLATION": "IPO_EASE_IN_OUT",
-    "FEET": "TRIA_DOWN_BAR",
-}
 
 
 class SCOPE_PT_corrections(PersonTab, Panel):

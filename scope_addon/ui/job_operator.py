@@ -15,6 +15,8 @@ from bpy.types import Context, Event, Operator, Scene
 from .reporting import sentence
 from .viewports import is_over_tab, redraw_sidebars_twice
 
+_previews: bpy.utils.previews.ImagePreviewCollection | None = None
+
 
 class JobState:
     """The running job, and the error message of the last one. Never saved."""
@@ -123,9 +125,6 @@ def clear_status_bar() -> None:
     for workspace in bpy.data.workspaces:
         with bpy.context.temp_override(workspace=workspace):  # Blender sets only the context's text
             workspace.status_text_set(None)
-
-
-_previews: bpy.utils.previews.ImagePreviewCollection | None = None
 
 
 def show_preview(pixels: bytes, width: int, height: int) -> None:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ..scene.rig_retarget import RetargetOptions, RetargetResult
 
 SHAPE_KEY = "key"  # the channel of entries of shape keys
+_SIDE_OFFSET_M = (1.5, 0.0, 0.0)  # to the left of a person who faces the front view
 
 
 def is_in_view_layer(cls: type[Operator], context: Context, chosen: Object) -> bool:
@@ -260,9 +261,6 @@ def listed_expressions(settings: PropertyGroup) -> ExpressionMap:
             factors = out.controls.setdefault(pair.key, {}).setdefault(pair.channel, {})
         factors[pair.expression] = round(pair.factor, 6)
     return out
-
-
-_SIDE_OFFSET_M = (1.5, 0.0, 0.0)  # to the left of a person who faces the front view
 
 
 class _RigOperator(ReportingOperator):

@@ -19,6 +19,8 @@ import bpy
 from bpy.types import Area, Context, Event, Region, Window
 
 TAB = "Scope"
+_ANGLES = [2 * math.pi * k / 20 for k in range(20)]
+_MOVES = ("MOUSEMOVE", "INBETWEEN_MOUSEMOVE")
 _DRAWN_AFTER_S = 0.3  # a sidebar knows its tabs only after it has been drawn
 
 
@@ -122,10 +124,6 @@ def viewport_at(pointer: int) -> tuple[Window, Area] | None:
     :param pointer: ``as_pointer`` of the viewport's area.
     """
     return next((pair for pair in viewports() if pair[1].as_pointer() == pointer), None)
-
-
-_ANGLES = [2 * math.pi * k / 20 for k in range(20)]
-_MOVES = ("MOUSEMOVE", "INBETWEEN_MOUSEMOVE")
 
 
 def region_at(pointer: int) -> tuple[Area, Region] | None:

@@ -28,6 +28,8 @@ from ..timing import whole_frames_of
 
 SLIDER_LIMIT = 10.0  # the limit of Blender's sliders
 MODES = ("keyed", "baked")
+MOUTH_COLOR = (0.06, 0.01, 0.01)  # linear
+MOVES = 1e-3  # change of a weight from which an expression counts as moving
 
 
 def build_mesh(name: str, body: Body, vertices: Float64Array, collection: Collection) -> Object:
@@ -190,10 +192,6 @@ def key_vertices(key: bpy.types.ShapeKey) -> Float32Array:
     vertices = np.empty((len(key.data), 3), np.float32)
     key.data.foreach_get("co", vertices.ravel())
     return vertices
-
-
-MOUTH_COLOR = (0.06, 0.01, 0.01)  # linear
-MOVES = 1e-3  # change of a weight from which an expression counts as moving
 
 
 def has_expression_keys(keys: Key) -> bool:

@@ -12,7 +12,7 @@ from scope.scope_addon.errors import UsageError
 from scope.scope_addon.output_paths import SUFFIXES, WITHOUT_SCENE
 from scope.scope_addon.scene.build import NEW_SCENE, build_scene
 from scope.scope_addon.scene.datablocks import captures_of
-from scope.scope_addon.scene.export import formats, usd_file
+from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import ExportOptions, export, export_motions
 from scope.scope_addon.scene.export.fbx_file import below
 
@@ -95,7 +95,7 @@ def test_usd_counts_time_in_the_scenes_frames_and_lengths_in_metres(body, make_m
     build_scene([make_motion(body, 3, rate=29.97)], body, options=NEW_SCENE)
     path = tmp_path / "walk.usdc"
     formats.write_usd(path)
-    layer = usd_file._usd_module().Layer.OpenAsAnonymous(str(path))
+    layer = formats._usd_module().Layer.OpenAsAnonymous(str(path))
     assert layer.timeCodesPerSecond == pytest.approx(30000 / 1001, rel=1e-6)
     assert layer.pseudoRoot.GetInfo("metersPerUnit") == 1.0
     assert layer.pseudoRoot.GetInfo("upAxis") == "Z"

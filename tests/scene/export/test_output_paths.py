@@ -13,8 +13,7 @@ import pytest
 from scope.scope_addon.errors import OutputError, UsageError
 from scope.scope_addon.output_paths import check_output, person_paths
 from scope.scope_addon.scene.export.export import export_motions
-from scope.scope_addon.scene.export.formats import is_whole_blend
-from scope.scope_addon.scene.export.usd_file import is_whole_crate
+from scope.scope_addon.scene.export.formats import is_whole_blend, is_whole_crate
 
 
 def test_the_check_needs_no_blender():

@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 import pytest
 from scope.scope_addon.errors import OutputError
-from scope.scope_addon.scene.export import formats, usd_file
+from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import export_motions
 
 PIECE = 256  # bytes
@@ -42,7 +42,7 @@ def test_a_piece_that_the_disk_has_refused_is_noticed(
 
 
 def test_what_is_no_number_is_the_same_in_the_file(tmp_path):
-    sdf = usd_file._usd_module()
+    sdf = formats._usd_module()
     path = tmp_path / "some.usdc"
     layer, other = (sdf.Layer.CreateAnonymous() for _ in range(2))
     for each, last in ((layer, 0.0), (other, 1.0)):
@@ -50,8 +50,8 @@ def test_what_is_no_number_is_the_same_in_the_file(tmp_path):
         sizes = sdf.AttributeSpec(prim, "sizes", sdf.ValueTypeNames.FloatArray)
         sizes.default = [float("nan"), -0.0, last]
     layer.Export(str(path))
-    assert usd_file.has_content(path, layer)
-    assert not usd_file.has_content(path, other)
+    assert formats.has_content(path, layer)
+    assert not formats.has_content(path, other)
 
 
 def test_nothing_stays_registered(body, make_motion, tmp_path):
