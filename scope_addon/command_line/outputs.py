@@ -256,6 +256,37 @@ def checked_rigs(
     :raises ScopeError: a rig cannot be used, or the arguments contradict each other.
     """
     _check_output_options(args, outputs)
+    of_rigs = _arguments_of_rigs(args, outputs, face)
+    if not of_rigs:
+        return []
+    from ..retarget.rig_source import rig_source
+
+    rigs = [
+        rig_source(path, name or "", bones, expressions)
+        for path, name, bones, expressions in zip(args.retarget, *of_rigs, strict=True)
+    ]
+    load_blender()
+    from ..scene.rig_file import check_rig
+
+    written = [*outputs, *filter(None, (getattr(args, "overlay", None),))]
+    checked = []
+    for rig in rigs:
+        with bounded_import(rig.path):
+            referred = check_rig(rig, fingers=fingers)
+        refuse_inputs(written, referred)
+        checked.append(replace(rig, files=referred))
+    return checked
+
+
+def _arguments_of_rigs(
+    args: argparse.Namespace, outputs: list[Path], face: bool
+) -> list[list[Any]]:
+    """Return names, bone maps and expression maps of the user's rigs, each a list with an entry for
+    each rig; nothing without --retarget.
+
+    :param face: whether the motion has expressions.
+    :raises UsageError: the arguments contradict each other, or the outputs.
+    """
     of_rigs = {
         "--rig-object": args.rig_object,
         "--bone-map": args.bone_map,
@@ -293,26 +324,7 @@ def checked_rigs(
                 f"{flag} is given {len(values)} times for {counted(count, 'rig')}: give it once "
                 "for each rig, in the same order, or not at all"
             )
-    from ..retarget.rig_source import rig_source
-
-    names, bone_maps, expression_maps = (values or [None] * count for values in of_rigs.values())
-    rigs = [
-        rig_source(path, name or "", bones, expressions)
-        for path, name, bones, expressions in zip(
-            args.retarget, names, bone_maps, expression_maps, strict=True
-        )
-    ]
-    load_blender()
-    from ..scene.rig_file import check_rig
-
-    written = [*outputs, *filter(None, (getattr(args, "overlay", None),))]
-    checked = []
-    for rig in rigs:
-        with bounded_import(rig.path):
-            referred = check_rig(rig, fingers=fingers)
-        refuse_inputs(written, referred)
-        checked.append(replace(rig, files=referred))
-    return checked
+    return [values or [None] * count for values in of_rigs.values()]
 
 
 def write_outputs(

@@ -234,24 +234,7 @@ class Batch:
         :raises UsageError: a clip has the name of another folder's results.
         """
         resolve_link(self.report_file)
-        try:
-            report = json.loads(self.report_file.read_text(encoding="utf-8"))
-            of_clips = {unicode_text(name): name for name in clips}
-            entries = {
-                of_clips.get(e["name"], e["name"]): {"folder": report["folder"]} | e
-                for e in [*report["files"], *report.get(OTHERS, [])]
-                if isinstance(e["status"], str)
-            }
-            ours = {
-                each
-                for each in {e["folder"] for e in entries.values()}
-                if unicode_text(folder) == each
-                or unicode_text(self.folder) == str(Path(each).resolve())
-            }
-        except (OSError, ValueError, KeyError, TypeError, RecursionError):
-            return {}
-        own = {name: _as_own(e) for name, e in entries.items() if e["folder"] in ours}
-        others = {name: e for name, e in entries.items() if name not in own}
+        own, others = self._read_entries(clips, folder)
         self._others = [e for name, e in others.items() if name not in clips]
         shared = {name: e for name, e in others.items() if name in clips and e.get("outputs")}
         if is_url(folder):
@@ -268,6 +251,31 @@ class Batch:
                         f"{self.report_file} if it may be replaced"
                     )
         return own | {name: _as_own(e) for name, e in shared.items()}
+
+    def _read_entries(
+        self, clips: dict[str, Path], folder: str
+    ) -> tuple[dict[str, Entry], dict[str, Entry]]:
+        """Return the entries of the previous report by name: those of this folder, and those of
+        others, each with its folder.
+        """
+        try:
+            report = json.loads(self.report_file.read_text(encoding="utf-8"))
+            of_clips = {unicode_text(name): name for name in clips}
+            entries = {
+                of_clips.get(e["name"], e["name"]): {"folder": report["folder"]} | e
+                for e in [*report["files"], *report.get(OTHERS, [])]
+                if isinstance(e["status"], str)
+            }
+            ours = {
+                each
+                for each in {e["folder"] for e in entries.values()}
+                if unicode_text(folder) == each
+                or unicode_text(self.folder) == str(Path(each).resolve())
+            }
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+            return {}, {}
+        own = {name: _as_own(e) for name, e in entries.items() if e["folder"] in ours}
+        return own, {name: e for name, e in entries.items() if name not in own}
 
     def _write_report(
         self, entries: dict[str, Entry], previous: dict[str, Entry], runner: Runner, *, last: bool
