@@ -128,7 +128,7 @@ def test_where_there_are_no_locks_everything_works_and_nothing_is_taken_for_aban
     left = set(os.listdir(tmp_path))
 
     def no_locks(handle, operation):
-        raise OSError(37, "No locks available")
+        raise OSError(errno.ENOLCK, "No locks available")
 
     monkeypatch.setattr(fcntl, "flock", no_locks)
     with atomic_path(tmp_path / "run.npz") as own:
