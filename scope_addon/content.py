@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is in a file, as a hash that takes a bounded time. Standard library only."""
+"""What is in a file, as a hash that takes a bounded time; when it was written. Standard library
+only.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import stat
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 _PIECE_BYTES = 1 << 20
@@ -48,3 +52,22 @@ def state_of(path: Path) -> tuple[int, ...]:
     except (FileNotFoundError, NotADirectoryError):
         return ()
     return (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
+
+
+def size_and_time(path: Path) -> tuple[int, ...]:
+    """Return those of a file; some file systems change its number by themselves. Empty if it cannot
+    be seen, which whoever reads or writes it says.
+    """
+    try:
+        return state_of(path)[2:]
+    except OSError:
+        return ()
+
+
+def newest_first(paths: Iterable[Path]) -> list[Path]:
+    """Return paths, what was changed last first, without what is removed meanwhile."""
+    times: dict[Path, float] = {}
+    for path in paths:
+        with suppress(OSError):
+            times[path] = path.stat().st_mtime
+    return sorted(times, key=times.__getitem__, reverse=True)

@@ -94,3 +94,9 @@ class FootageView:
 
 
 AS_IN_FILE = FootageView()
+
+
+def scaled_size(width: int, height: int, longer_side: float) -> tuple[float, tuple[int, int]]:
+    """Return the scale with which a picture has this longer side, and its width and height then."""
+    scale = longer_side / max(width, height)
+    return scale, (max(1, round(width * scale)), max(1, round(height * scale)))

@@ -137,20 +137,6 @@ def draw_overlay(
     :return: a new image of the same size.
     """
     canvas = Canvas.blank(image_rgb.shape[1], image_rgb.shape[0])
-    _draw_bodies(canvas, vertices_cam, faces, intrinsics, dist, colors, opacities)
-    return blended(image_rgb, canvas)
-
-
-def _draw_bodies(
-    canvas: Canvas,
-    vertices_cam: Sequence[FloatArray],
-    faces: NDArray[np.integer[Any]],
-    intrinsics: Float64Array,
-    dist: Float64Array | None,
-    colors: Sequence[ArrayLike],
-    opacities: Sequence[float],
-) -> None:
-    """Draw the bodies of several people into a canvas; see `draw_overlay`."""
     triangles = (
         faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
     )
@@ -159,10 +145,6 @@ def _draw_bodies(
         if per_face.ndim == 2 and len(per_face) != len(triangles):
             per_face = np.concatenate([per_face, per_face])  # a quad's two halves
         rasterize(canvas, vertices, triangles, per_face, intrinsics, dist, opacity)
-
-
-def blended(image_rgb: Uint8Array, canvas: Canvas) -> Uint8Array:
-    """Return a copy of an (H, W, 3) uint8 image with the canvas over it."""
     out = np.ascontiguousarray(image_rgb).copy()
     _blend(out, canvas.rgba)
     return out
@@ -237,7 +219,6 @@ class _Painter:
         self._resized = (width, height)
         # Encoders need even sides. Cropping the last row or column does not change the intrinsics.
         self.size = (width - width % 2, height - height % 2) if even else self._resized
-        self._canvas = Canvas.blank(*self.size)
 
     def paint(self, frame: Frame) -> Uint8Array:
         image = frame.image_rgb
@@ -250,9 +231,8 @@ class _Painter:
             return image
         # All people of one clip have the same camera.
         motion = self._people[shown[0][0]]
-        self._canvas.clear()
-        _draw_bodies(
-            self._canvas,
+        image = draw_overlay(
+            image,
             [camera_vertices(self._people[i], self._body, row) for i, row in shown],
             self._body.faces,
             scaled_intrinsics(motion.intrinsics_of_frames[shown[0][1]], self._scale),
@@ -260,7 +240,6 @@ class _Painter:
             [self._colors[i] for i, _ in shown],
             [OPACITY * (1.0 if self._people[i].valid[row] else _FAINT) for i, row in shown],
         )
-        image = blended(image, self._canvas)
         for i, row in shown:
             if self._people[i].valid[row]:
                 self._draw_keypoints(image, self._people[i].keypoints2d[row], tint(i))

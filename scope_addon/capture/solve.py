@@ -159,15 +159,19 @@ class Person:
         if is_smoothed:
             self.fit = fit_clip(self.prepared, self.fit, shot.path, self._progress)
             return_freed_memory()
-        raw = self.fit if shot.is_still else self._fit_frames_alone()
+        raw = self.fit
+        if not shot.is_still:
+            raw = replace(
+                to_single_precision(self._fit_frames_alone()),
+                joint_sigma_m=self.fit.joint_sigma_m,
+                height_sigma_m=self.fit.height_sigma_m,
+            )
         if not is_smoothed:
             self.fit = raw
         self.raw = RawMotion.of(self.track, raw.with_fingers_at_rest(self.prepared), shot.path)
 
     def _fit_frames_alone(self) -> FittedTrack:
-        raw = to_single_precision(fit_each_frame(self.prepared, self.fit, self._progress))
-        sigma_m = self.fit.joint_sigma_m
-        return replace(raw, joint_sigma_m=sigma_m, height_sigma_m=self.fit.height_sigma_m)
+        return fit_each_frame(self.prepared, self.fit, self._progress)
 
     def settle(self, shot: Shot) -> None:
         """Place the finished motion, and let go of the measurements."""

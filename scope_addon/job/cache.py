@@ -20,6 +20,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..content import newest_first
 from ..temporary import (
     discard,
     new_folder,
@@ -184,7 +185,7 @@ class Cache:
     def prune(self, limit: int) -> None:
         """Remove the least recently used captures until the others fit into ``limit`` bytes."""
         total = 0
-        for index, folder in enumerate(_by_time(own_entries(self.root / "captures", _KEY))):
+        for index, folder in enumerate(newest_first(own_entries(self.root / "captures", _KEY))):
             total += _size(folder)
             if index and total > limit:  # the newest is kept: it has just been captured
                 remove(folder)
@@ -208,21 +209,12 @@ class Cache:
         """Return the folders of code that another version has replaced."""
         newest: set[str] = set()
         replaced = []
-        for path in _by_time(own_entries(self.kernels, _VERSION)):
+        for path in newest_first(own_entries(self.kernels, _VERSION)):
             area = path.name.rpartition("-")[0]
             if area in newest:
                 replaced.append(path)
             newest.add(area)
         return replaced
-
-
-def _by_time(folders: list[Path]) -> list[Path]:
-    """Return folders, what was changed last first, without concurrently removed ones."""
-    times: dict[Path, float] = {}
-    for path in folders:
-        with suppress(OSError):
-            times[path] = path.stat().st_mtime
-    return sorted(times, key=times.__getitem__, reverse=True)
 
 
 def _size(folder: Path) -> int:

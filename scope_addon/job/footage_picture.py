@@ -41,7 +41,7 @@ def write_picture(request: PictureRequest, job_folder: Path, send: Callable[...,
 
     from ..capture.media.video import open_video
     from ..capture.media.video_range import VideoRange
-    from ..footage_view import FootageView
+    from ..footage_view import FootageView, scaled_size
 
     view = FootageView(int(request.rotate), request.mirror)
     with open_video(request.footage, VideoRange(request.time_s, view=view)) as video:
@@ -49,8 +49,7 @@ def write_picture(request: PictureRequest, job_folder: Path, send: Callable[...,
     if frame is None:
         raise VideoError(f"{request.footage} has no frame at {request.time_s:.2f} s")
     height, width = frame.image_rgb.shape[:2]
-    scale = min(1.0, LONGER_SIDE / max(height, width))
-    shown_size = max(1, round(scale * width)), max(1, round(scale * height))
+    _, shown_size = scaled_size(width, height, min(LONGER_SIDE, max(width, height)))
     shown = cv2.resize(frame.image_rgb, shown_size, interpolation=cv2.INTER_AREA)
     rgba = cv2.cvtColor(shown, cv2.COLOR_RGB2RGBA)
     (job_folder / FILE).write_bytes(rgba[::-1].tobytes())

@@ -19,6 +19,7 @@ from .process import (
     LONGEST_LINE,
     START_SCRIPT,
     WorkerProcess,
+    is_figure,
     is_number,
     is_text,
     unreadable,
@@ -30,10 +31,6 @@ _POSE = re.compile(rb'\{"event": "pose", "person": (\d),')
 _FARTHEST_M = 1e4
 _LARGEST_BETA = 1e3
 _UNIT_TOLERANCE = 0.01  # of a quaternion's length, which is rounded
-
-
-def _is_measure(value: object) -> bool:
-    return type(value) in (int, float) and 0 <= value < 1e12  # type: ignore[operator]
 
 
 @dataclass(frozen=True)
@@ -56,9 +53,9 @@ class LiveProcess(WorkerProcess):
         "progress": CAPTURE_FIELDS["progress"],
         "status": {
             "presence": lambda value: value in PRESENCES,
-            "rate": _is_measure,
-            "latency_ms": _is_measure,
-            "recorded_s": _is_measure,
+            "rate": is_figure,
+            "latency_ms": is_figure,
+            "recorded_s": is_figure,
         },
         "notice": {"text": is_text},
         "ended": {},

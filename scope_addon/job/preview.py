@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import cv2
@@ -28,6 +27,7 @@ from ..capture.media.frame import Frame
 from ..capture.overlay_video import body_colors, draw_overlay, tint
 from ..capture.perception.landmark_network import KEYPOINT_NAMES
 from ..capture.perception.observation import Observation
+from ..footage_view import scaled_size
 from ..temporary import remove
 
 _LOG = logging.getLogger(__name__)
@@ -77,12 +77,7 @@ class PreviewWriter:
     def __enter__(self) -> PreviewWriter:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        at: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         with self._writing:
             self._open = False
             remove(self._path)  # unless the parent reads it, on Windows: it stays in its folder
@@ -157,8 +152,7 @@ def draw(
     :return: (h, w, 4) RGBA.
     """
     height, width = image_rgb.shape[:2]
-    scale = LONGER_SIDE / max(height, width)
-    size = max(1, round(width * scale)), max(1, round(height * scale))
+    scale, size = scaled_size(width, height, LONGER_SIDE)
     large_size = size[0] * _SUPERSAMPLE, size[1] * _SUPERSAMPLE
     large: NDArray[Any] = cv2.resize(image_rgb, large_size, interpolation=cv2.INTER_AREA)
     for person, pose in reversed([*zip(people, poses or [None] * len(people), strict=True)]):

@@ -84,7 +84,7 @@ def _is_report(value: object) -> bool:
     known_sigmas = [sigma for sigma in sigmas if sigma is not None]
     texts = [value.get(name, "") for name in ("camera", "execution")]
     return (
-        all(map(_is_figure, [*rates.values(), *heights, *known_sigmas]))
+        all(map(is_figure, [*rates.values(), *heights, *known_sigmas]))
         and all(isinstance(text, str) for text in warnings)
         and all(is_text(text) and is_utf8(text) for text in texts)
         and all(type(view.get("is_used")) is bool for view in views)
@@ -95,7 +95,8 @@ def _are_records(value: object) -> bool:
     return isinstance(value, list) and all(isinstance(each, dict) for each in value)
 
 
-def _is_figure(value: object) -> bool:
+def is_figure(value: object) -> bool:
+    """Return whether it is a finite number from 0."""
     return type(value) in (int, float) and 0 <= value < _LARGEST_NUMBER  # type: ignore[operator]
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ...solver.errors import ScopeError
-from ..content import add_content, state_of
+from ..content import add_content, size_and_time, state_of
 from ..errors import ChangedFootageError, unreadable
 
 _INTERVAL_S = 2.0  # between two looks at the files
@@ -28,7 +28,7 @@ class WatchedFiles:
     """
 
     def __init__(self, files: Iterable[Path]) -> None:
-        self._states = {file: (_size_and_time(file), _whole_content(file)) for file in files}
+        self._states = {file: (size_and_time(file), _whole_content(file)) for file in files}
 
     def check(self) -> None:
         """Compare the files with what they were; one that was written again with the same content
@@ -37,7 +37,7 @@ class WatchedFiles:
         :raises ChangedFootageError: one was replaced, changed or removed.
         """
         for file, (before, content) in self._states.items():
-            if _size_and_time(file) != before and _whole_content(file) != content:
+            if size_and_time(file) != before and _whole_content(file) != content:
                 raise _changed(file)
 
 
@@ -161,16 +161,6 @@ class WatchedFootage:
         now = state_of(file)
         is_longer = len(before) == len(now) and now[:2] == before[:2] and now[2:3] > before[2:3]
         return is_longer and self._grows != b"" and self._ends() == self._grows
-
-
-def _size_and_time(file: Path) -> tuple[int, ...]:
-    """Return those of a file; some file systems change its number by themselves. Empty if it cannot
-    be seen, which whoever reads it says.
-    """
-    try:
-        return state_of(file)[2:]
-    except OSError:
-        return ()
 
 
 def _whole_content(file: Path) -> bytes:

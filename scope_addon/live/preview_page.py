@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from ...solver import Body
 from ..capture.camera.intrinsics import Camera, scaled_intrinsics
 from ..errors import OutputError
+from ..footage_view import scaled_size
 from .people import LivePeople
 from .pose import LivePose, Presence
 from .session import LiveSession
@@ -150,8 +151,7 @@ class PreviewPage:
     def _drawn(self, picture: Picture, poses: Sequence[LivePose]) -> bytes:
         """Return a picture with the skeletons of those who are seen, as JPEG."""
         height, width = picture.image_rgb.shape[:2]
-        scale = min(1.0, LONGER_SIDE / max(height, width))
-        size = max(1, round(width * scale)), max(1, round(height * scale))
+        scale, size = scaled_size(width, height, min(LONGER_SIDE, max(width, height)))
         image: NDArray[Any] = np.ascontiguousarray(
             cv2.resize(picture.image_rgb, size, interpolation=cv2.INTER_AREA)
         )

@@ -12,7 +12,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-from ..content import state_of
+from ..content import newest_first, size_and_time
 from ..errors import OutputError
 from ..private_folder import lasting_folder
 from ..temporary import is_abandoned, remove, system_folder
@@ -53,12 +53,9 @@ def temporary_place() -> Path:
 
 def recordings_in(folder: Path) -> list[Path]:
     """Return the recordings in a folder, the newest first."""
-    times: dict[Path, float] = {}
     with suppress(OSError):
-        for path in folder.glob(f"*{SUFFIX}"):
-            with suppress(OSError):
-                times[path] = path.stat().st_mtime
-    return sorted(times, key=times.__getitem__, reverse=True)
+        return newest_first(folder.glob(f"*{SUFFIX}"))
+    return []
 
 
 def remove_recording(recording: Path) -> None:
@@ -79,21 +76,14 @@ class Target:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._before = self._written()
+        self._before = size_and_time(path)
 
     def check(self) -> None:
         """Compare the file with what it was.
 
         :raises OutputError: somebody has written it.
         """
-        if self._written() != self._before:
+        if size_and_time(self._path) != self._before:
             raise OutputError(
                 f"{self._path} is not replaced, since another program has written it meanwhile"
             )
-
-    def _written(self) -> tuple[int, ...]:
-        """Return size and time; some file systems change a file's number by themselves."""
-        try:
-            return state_of(self._path)[2:]
-        except OSError:  # which writing says
-            return ()

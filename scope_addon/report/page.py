@@ -25,6 +25,7 @@ from ..capture.fitting.outline import spread
 from ..capture.media.video_range import FootageRange
 from ..capture.overlay_video import painted_frames
 from ..errors import OutputError
+from ..footage_view import scaled_size
 from ..motion import Motion
 
 Markup = NewType("Markup", str)
@@ -278,8 +279,7 @@ def small_picture(row: int, image: NDArray[np.uint8], longest_side: int = LONGES
     :raises OutputError: OpenCV cannot write WebP.
     """
     height, width = image.shape[:2]
-    scale = min(1.0, longest_side / max(height, width))
-    size = max(1, round(width * scale)), max(1, round(height * scale))
+    scale, size = scaled_size(width, height, min(longest_side, max(width, height)))
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA) if scale < 1 else image
     ok, data = cv2.imencode(
         ".webp", cv2.cvtColor(small, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_WEBP_QUALITY, _QUALITY]

@@ -37,7 +37,6 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
 from dataclasses import replace
-from types import TracebackType
 
 import numpy as np
 
@@ -232,12 +231,7 @@ class BackgroundEstimators:
     def __enter__(self) -> BackgroundEstimators:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        at: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         # Do not wait: the solver may be compiling, and only those who need it then should wait for
         # it.
         for pool in (self.pool, self._solver):

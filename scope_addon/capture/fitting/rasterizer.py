@@ -55,11 +55,6 @@ class Canvas:
         """(H, W) bool: True where something was drawn."""
         return np.isfinite(self.depth)
 
-    def clear(self) -> None:
-        """Empty the canvas for the next frame."""
-        self.rgba.fill(0)
-        self.depth.fill(np.inf)
-
 
 def rasterize(
     canvas: Canvas,

@@ -6,15 +6,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, Protocol
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.names import BLAZEPOSE
 from ...arrays import Float32Array, Float64Array, FloatArray, Uint8Array
-from .region import MARGIN, Region, region_from_points
+from .region import MARGIN, Region, network_input, region_from_points
 from .sessions import Execution, network_path, open_session
 
 if TYPE_CHECKING:
@@ -178,7 +177,7 @@ class LandmarkNetwork:
         anyway.
         """
         (logits,) = self._session(self._threads_alone).run(
-            ["mask"], {"input": _blob(region.cut(image_rgb, INPUT_SIZE))} | _WITH_MASK
+            ["mask"], {"input": network_input(region.cut(image_rgb, INPUT_SIZE))} | _WITH_MASK
         )
         return _probability(logits)
 
@@ -197,7 +196,7 @@ class LandmarkNetwork:
             if values is not None and len(values) == _VALUES:
                 return _unpacked(values, region)
         outputs = [*_OUTPUTS, "mask"] if with_mask else _OUTPUTS
-        inputs = {"input": _blob(crop_rgb)} | (_WITH_MASK if with_mask else {})
+        inputs = {"input": network_input(crop_rgb)} | (_WITH_MASK if with_mask else {})
         landmarks, presence, heatmap, world, *logits = session.run(outputs, inputs)
         estimate = interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
         if memory is not None:
@@ -214,11 +213,6 @@ def _probability(logits: Float32Array) -> Float32Array:
 
 def _sigmoid(logits: FloatArray) -> FloatArray:
     return 1.0 / (1.0 + np.exp(-np.clip(logits, -50.0, 50.0)))
-
-
-def _blob(crop_rgb: Uint8Array) -> Float32Array:
-    """Return the network's input (1, 3, 256, 256) in [0, 1]."""
-    return cast(Float32Array, cv2.dnn.blobFromImage(crop_rgb, 1 / 255.0))
 
 
 def _packed(estimate: PoseEstimate) -> Float64Array:

@@ -18,7 +18,7 @@ from typing import cast
 import cv2
 import numpy as np
 
-from ...arrays import BoolArray, Float64Array, FloatArray, Uint8Array, round_number
+from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray, Uint8Array, round_number
 from ...errors import UsageError
 
 MARGIN = 1.25  # side of the square over the body circle's diameter
@@ -264,6 +264,11 @@ def inside(points: FloatArray, boxes: Sequence[FloatArray]) -> BoolArray:
 
 
 MIN_SIDE_PX = 32  # of a part; in a smaller one nobody is found
+
+
+def network_input(crop_rgb: Uint8Array) -> Float32Array:
+    """Return a picture (H, W, 3) as most networks take it: (1, 3, H, W) in [0, 1]."""
+    return cast(Float32Array, cv2.dnn.blobFromImage(crop_rgb, 1 / 255.0))
 
 
 @dataclass(frozen=True)

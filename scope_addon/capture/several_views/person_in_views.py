@@ -167,9 +167,7 @@ class PersonInViews(Person):
     def _fit_frames_alone(self) -> FittedTrack:
         if not self.prepared.others:
             return super()._fit_frames_alone()
-        raw = to_single_precision(fit_views_alone(self.prepared, self.fit))
-        sigma_m = self.fit.joint_sigma_m
-        return replace(raw, joint_sigma_m=sigma_m, height_sigma_m=self.fit.height_sigma_m)
+        return fit_views_alone(self.prepared, self.fit)
 
 
 def fit_views(prepared: PreparedTrack) -> FittedTrack:

@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 
 from ...arrays import FloatArray, Uint8Array
+from ...footage_view import scaled_size
 from ..perception.region import Region
 
 LARGEST_SIDE_PX = 448  # of the picture in which is painted: twice the detector's input
@@ -33,8 +34,7 @@ def remove_people(image_rgb: Uint8Array, people: Sequence[tuple[Region, FloatArr
     :param people: a region of the landmark network and the probability (S, S) in its crop, of each.
     """
     height, width = image_rgb.shape[:2]
-    scale = min(1.0, LARGEST_SIDE_PX / max(height, width))
-    size = max(1, round(width * scale)), max(1, round(height * scale))
+    _, size = scaled_size(width, height, min(LARGEST_SIDE_PX, max(width, height)))
     shrinkage = np.array(size) / (width, height)
     probability = np.zeros(size[::-1], np.float32)
     for region, mask in people:

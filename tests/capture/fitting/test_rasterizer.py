@@ -167,6 +167,3 @@ def test_the_lit_side_is_brighter_and_opacity_is_written():
     assert set(np.unique(canvas.rgba[..., 3])) == {0, 64}
     # the light stands above the left shoulder
     assert canvas.rgba[45, 70, 0] > canvas.rgba[75, 95, 0] + 20
-    canvas.clear()
-    assert not canvas.coverage.any()
-    assert not canvas.rgba.any()
