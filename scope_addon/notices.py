@@ -224,6 +224,8 @@ SENTENCES = {
     "rate_not_stated": "the file states no frame rate; {rate:g} frames per second were assumed",
     "rate_stated": "the file states {stated:g} frames per second, which were used, not {given:g}",
     "no_translation": "the file holds no translation: the pelvis stays in place",
+    "other_unit": "{file}: {array} is in {unit}, as only then the feet stand still on the floor, "
+    "so it was converted to metres",
     "unsure_up": "the file's up axis is not clear from the motion; {axis} was assumed",
     "other_skeleton": "limbs have the directions of the file's skeleton, but the body keeps its "
     "proportions; distances were multiplied by {scale:.5g}, the ratio of the legs' lengths",

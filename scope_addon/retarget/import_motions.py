@@ -8,7 +8,7 @@ R_world_root = R_world_file R_file_root,   pelvis_world = R_world_file (J_0(β) 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,13 @@ _AXIS_TEXT = {"z": "z", "y": "y", "camera": "minus y, as in a camera's axes,"}
 _UPRIGHT = 0.5  # mean cosine of the trunk with an axis, above which people stand or sit along it
 _LATEST_S = 1e10  # of a frame; 300 years
 _LARGEST_BODY_M = 50.0
+# Units in which some tools write translations, by how many of them make a metre.
+_UNITS = {100: "cm", 1000: "mm"}
+# Of how far soles slip with another unit to how far they slip in metres, and without translation.
+# Of a captured walk, both are 0.01 in the right unit. With a skater's 2 to 25 m/s added to it, no
+# unit has below 0.8 of the slip without translation.
+_LESS_SLIP = 0.1
+_LESS_SLIP_THAN_IN_PLACE = 0.7
 _CAMERA_DISTANCE_M = 10.0  # in front of the nearest position; motion files need a camera
 
 
@@ -100,7 +107,54 @@ def import_motions(
         )
         up = axis if is_sure else up
     begin = min(int(source.frames[0]) for source in sources)
-    return [convert(source, loaded, path, up, rate, begin) for source in sources]
+    per_metre = _units_per_metre(sources, loaded)
+    found = []
+    for source in sources:
+        notes = []
+        if per_metre > 1 and source.trans is not None:
+            source = replace(source, trans=source.trans / per_metre)
+            notes.append(
+                notice(
+                    "other_unit",
+                    file=path.name,
+                    array=source.trans_name,
+                    unit=_UNITS[per_metre],
+                )
+            )
+        imported = convert(source, loaded, path, up, rate, begin)
+        found.append(replace(imported, notes=[*notes, *imported.notes]))
+    return found
+
+
+def _units_per_metre(sources: Sequence[SmplMotion], body: Body) -> int:
+    """Return by what the translations of a file are divided to be in metres: 1, or a key of
+    `_UNITS`.
+
+    People mostly stand on some foot. In the right unit, of u to a metre, a sole then hardly moves,
+
+        slip(u) = median over t of min over soles of |Δ(sole - pelvis) + Δtrans / u|.
+
+    Someone whom skates or a vehicle carry slips in every unit, and in no other one less than with
+    the pelvis in place.
+    """
+    slips: dict[float, list[Float64Array]] = {u: [] for u in (1, *_UNITS, np.inf)}
+    for source in sources:
+        if source.trans is None:
+            continue
+        poses, _ = _for_body(source, body)
+        soles = np.diff(_soles(body, np.zeros(body.P), poses), axis=0)
+        pelvis = np.diff(source.trans, axis=0)[:, None]
+        for u, slip in slips.items():
+            slip.append(np.linalg.norm(soles + pelvis / u, axis=-1).min(axis=1))
+    if not any(map(len, slips[1])):
+        return 1
+    slip_of = {u: float(np.median(np.concatenate(slip))) for u, slip in slips.items()}
+    best = min(_UNITS, key=lambda u: slip_of[u])
+    is_told = (
+        slip_of[best] < _LESS_SLIP * slip_of[1]
+        and slip_of[best] < _LESS_SLIP_THAN_IN_PLACE * slip_of[np.inf]
+    )
+    return best if is_told else 1
 
 
 def _ignored_rate(stated: float | None, given: float) -> list[Notice]:
@@ -268,6 +322,14 @@ def _up_axis(poses: Float64Array, body: Body, usual: str) -> tuple[str, bool]:
     return (best, True) if along[best] > _UPRIGHT else (usual, False)
 
 
+def _soles(body: Body, betas: Float64Array, poses: Float64Array) -> Float64Array:
+    """Return the sole points (T, 4, 3) of a body whose pelvis is at the origin, metres."""
+    (soles,) = by_blocks(
+        lambda p: (Clip(np.zeros(len(p)), exp(p), np.zeros((len(p), 3))).soles(body, betas),), poses
+    )
+    return soles
+
+
 def _standing(
     body: Body,
     betas: Float64Array,
@@ -278,9 +340,7 @@ def _standing(
     """Return the (T, 4) probability that each sole point is in contact, and the height of the floor
     that follows.
     """
-    (soles,) = by_blocks(
-        lambda p, r: (Clip(np.zeros(len(p)), exp(p), r).soles(body, betas),), poses, root
-    )
+    soles = _soles(body, betas, poses) + root[:, None]
     weight = standing_probability(soles, UP, times)
     heights = soles[..., 2]
     standing = weight > 0.5

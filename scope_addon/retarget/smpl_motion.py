@@ -41,6 +41,8 @@ SLOWEST = 1e-4
 FASTEST = 10_000.0
 _POSITIVE = (float(np.finfo(float).tiny), float(np.finfo(float).max))
 _ORTHONORMAL = 0.01  # largest deviation of RᵀR from the identity
+# Radians, of an axis-angle vector. Half a turn reaches every pose, but fits leave a whole one.
+_LARGEST_TURN = 4.0 * np.pi
 FARTHEST_M = 1e5  # from the origin; a number beyond that is not in metres
 
 # Names of one thing in the files of different tools, in the order in which they are preferred.
@@ -106,6 +108,7 @@ class SmplMotion:
     frames: NDArray[np.int64]
     # Names of the file's arrays that are in no form which can be applied to a body.
     left_out: tuple[str, ...] = ()
+    trans_name: str = ""  # of the file's array
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -230,6 +233,7 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
         models=_models(arrays, names),
         frames=_frames(arrays, count),
         left_out=_left_out(arrays, names),
+        trans_name=trans or "",
     )
 
 
@@ -403,8 +407,14 @@ def _axis_angles(array: NDArray[Any], what: str, *, w_last: bool) -> Float32Arra
         matrices = values.reshape(len(values), -1, 3, 3)
         return by_blocks(lambda block: (_logarithms(block, what),), matrices)[0]
     if values.ndim == 2 and values.shape[1] and values.shape[1] % 3 == 0:
-        return values.reshape(len(values), -1, 3).astype(np.float32)
+        values = values.reshape(len(values), -1, 3)
     if values.ndim == 3 and values.shape[2] == 3 and values.shape[1]:
+        largest = float(np.linalg.norm(values, axis=-1).max())
+        if largest > _LARGEST_TURN:
+            raise MotionFileError(
+                f"{what} holds axis-angle vectors of up to {largest:.4g} radians, several turns, "
+                "so it is probably in degrees; convert it to radians, as numpy.radians does"
+            )
         return values.astype(np.float32)
     if values.ndim == 3 and values.shape[2] in (4, 6) and values.shape[1]:
         to_matrices = _from_six

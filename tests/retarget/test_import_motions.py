@@ -148,6 +148,37 @@ def test_what_is_missing_is_assumed_and_said(tmp_path):
     np.testing.assert_allclose(np.ptp(found.motion.trans, axis=0), 0, atol=1e-6)
 
 
+@pytest.mark.parametrize(("per_metre", "unit"), [(100, "cm"), (1000, "mm")])
+@pytest.mark.parametrize("axis", ["z", "y"])
+def test_translations_in_another_unit_are_converted_and_said(tmp_path, axis, per_metre, unit):
+    arrays = in_file(axis, height=0.4)
+    np.savez(tmp_path / "metres.npz", **arrays)
+    np.savez(tmp_path / "other.npz", **arrays | {"trans": per_metre * arrays["trans"]})
+    in_metres = import_motion(tmp_path / "metres.npz")
+    found = import_motion(tmp_path / "other.npz")
+    np.testing.assert_allclose(joints(found.motion), joints(in_metres.motion), atol=1e-4)
+    assert [str(note) for note in found.notes if note.code == "other_unit"] == [
+        f"other.npz: trans is in {unit}, as only then the feet stand still on the floor, so it was "
+        "converted to metres"
+    ]
+    assert "other_unit" not in [note.code for note in in_metres.notes]
+
+
+@pytest.mark.parametrize("velocity", [[0.0, 8.0, 0.0], [0.0, 0.0, 2.0]])
+@pytest.mark.parametrize("is_still", [False, True])
+def test_whom_skates_or_a_lift_carry_is_in_metres(tmp_path, velocity, is_still):
+    arrays = in_file("z")
+    poses = arrays["poses"]
+    poses = np.tile(poses[:1], (len(poses), 1)) if is_still else poses
+    trans = arrays["trans"] + np.outer(MOTION.timestamps, velocity)
+    np.savez(tmp_path / "carried.npz", **arrays | {"poses": poses, "trans": trans})
+    found = import_motion(tmp_path / "carried.npz")
+    np.testing.assert_allclose(
+        np.diff(found.motion.trans, axis=0), np.diff(trans, axis=0), atol=1e-5
+    )
+    assert "other_unit" not in [note.code for note in found.notes]
+
+
 def test_arrays_that_no_body_can_have_are_said(tmp_path):
     np.savez(tmp_path / "walk.npz", **PIECES, pose_hand=np.ones((9, 12)))
     notes = import_motion(tmp_path / "walk.npz", up="z").notes

@@ -172,6 +172,11 @@ BROKEN = {
     "another skeleton": ({"poses": np.zeros((T, 75))}, "75 numbers per frame"),
     "several people": ({"poses": np.zeros((2, T, 24, 3, 3))}, "shape"),
     "quaternions": ({"poses": np.zeros((T, 24, 4))}, "quaternions that are not of length 1"),
+    "degrees": ({"poses": np.degrees(flat(0, 24))}, "poses holds .* degrees"),
+    "degrees of the body": (
+        PARTS | {"body_pose": np.degrees(RANDOM[:, 1:24])},
+        "body_pose holds .* degrees",
+    ),
     "NaN": ({"poses": with_nan()}, "NaN or infinity, first in frame 3"),
     "too long": ({"poses": np.broadcast_to(np.float32(0), (10_000_000, 72))}, "at most 500000"),
     "not rotations": (
