@@ -125,9 +125,7 @@ def open_trackers(
         if options.hands == OFF
         else HandTracker(threads, execution=execution, least_px=least_px)
     )
-    # The face's small layers take twice the processor time in two threads, which mostly wait for
-    # each other.
-    return Trackers(people, hands, FaceTracker(1, execution=execution) if options.face else None)
+    return Trackers(people, hands, FaceTracker(execution) if options.face else None)
 
 
 def _followed_people(options: CaptureOptions) -> int | None:

@@ -64,7 +64,7 @@ def _is_whole(kept: Path, count: int) -> bool:
 
 
 def _observe(folder: Path, count: int, scale: float, out: Path) -> None:
-    network = FaceNetwork(1)
+    network = FaceNetwork()
     expressions = ExpressionNetwork()
     rows = []
     for t in range(count):

@@ -92,8 +92,10 @@ class FaceNetwork:
     :raises ModelFileError: its file is damaged.
     """
 
-    def __init__(self, threads: int, execution: Execution | None = None) -> None:
-        self._session = open_session(network_path("face_landmark"), threads, execution)
+    def __init__(self, execution: Execution | None = None) -> None:
+        # Its small layers take twice the processor time in two threads, which mostly wait for each
+        # other.
+        self._session = open_session(network_path("face_landmark"), 1, execution)
 
     def estimate(self, image_rgb: Uint8Array, region: Region) -> FaceEstimate:
         """Estimate the face in a region of an (H, W, 3) uint8 RGB image."""

@@ -65,12 +65,12 @@ class FaceTracker:
     :raises ModelFileError: a network is damaged.
     """
 
-    def __init__(self, threads: int, execution: Execution | None = None) -> None:
+    def __init__(self, execution: Execution | None = None) -> None:
         with ThreadPoolExecutor(1) as pool:
             # `with_expressions` may need it: if it is missing or damaged, say so now. Opening takes
             # a core 20 ms.
             opened = pool.submit(ExpressionNetwork)
-            self._network = FaceNetwork(threads, execution)
+            self._network = FaceNetwork(execution)
             opened.result()
         self._faces: dict[int, _Face] = {}
 

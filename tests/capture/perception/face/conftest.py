@@ -14,7 +14,7 @@ from scope.scope_addon.capture.perception.region import Region
 
 @pytest.fixture(scope="module")
 def network() -> FaceNetwork:
-    return FaceNetwork(1)
+    return FaceNetwork()
 
 
 @pytest.fixture(scope="module")

@@ -126,7 +126,7 @@ def test_a_rendered_face_that_the_network_sees(tmp_path):
         truth, np.tile(R, (66, 1, 1)), np.full(66, 0.8), np.zeros(66, int), times, np.zeros((66, 3))
     )
     stage = ShadedStage(body)
-    network = FaceNetwork(1)
+    network = FaceNetwork()
     rows = []
     stage.dress(draw_look(body, rng), rng)
     region = Region((SIZE / 2, SIZE / 2), 0.8 * SIZE, 0.0)
@@ -161,7 +161,7 @@ def clip(frames):
     """Two and a half seconds of a real face: the network's estimates, and a track's rows of
     them.
     """
-    network = FaceNetwork(1)
+    network = FaceNetwork()
     region = Region((256.0, 118.0), 200.0, 0.0)
     estimates = []
     for image in frames("clips/squats_5fps", stop=13):

@@ -73,7 +73,7 @@ class FakeNetwork:
 @pytest.fixture
 def tracker(monkeypatch):
     monkeypatch.setattr(face_tracker, "FaceNetwork", FakeNetwork)
-    return FaceTracker(1)
+    return FaceTracker()
 
 
 def face_of(tracker, people, time_s=0.0):

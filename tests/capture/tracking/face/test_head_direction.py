@@ -40,7 +40,7 @@ def seen(tmp_path_factory):
     body = load_body("scope")
     path = tmp_path_factory.mktemp("faces") / "face.png"
     stage = ShadedStage(body)
-    network = FaceNetwork(1)
+    network = FaceNetwork()
     rng = np.random.default_rng(8)
     stage.dress(draw_look(body, rng), rng)
 
