@@ -71,10 +71,8 @@ class CameraPath:
         """
         if self.is_static:
             return fit
-        rotations = fit.rotations.copy()
-        rotations[:, 0] = self.R_first_camera @ rotations[:, 0]
         root = np.einsum("tij,tj->ti", self.R_first_camera, fit.t_camera_root) + self.center
-        return replace(fit, rotations=rotations, t_camera_root=root)
+        return _turned(fit, self.R_first_camera, root)
 
     def to_frames(self, fit: FittedTrack) -> FittedTrack:
         """Transform a fit from the first frame's axes to each frame's camera; the argument for a
@@ -82,10 +80,8 @@ class CameraPath:
         """
         if self.is_static:
             return fit
-        rotations = fit.rotations.copy()
-        rotations[:, 0] = np.swapaxes(self.R_first_camera, 1, 2) @ rotations[:, 0]
         root = self.points_to_frames(fit.t_camera_root[:, None])[:, 0]
-        return replace(fit, rotations=rotations, t_camera_root=root)
+        return _turned(fit, np.swapaxes(self.R_first_camera, 1, 2), root)
 
     def points_to_frames(self, points: FloatArray) -> FloatArray:
         """Transform points from the first frame's axes to each frame's camera.
@@ -120,6 +116,13 @@ class CameraPath:
         out[:, :3, :3] = T_world_first[:3, :3] @ self.R_first_camera
         out[:, :3, 3] = self.center @ T_world_first[:3, :3].T + T_world_first[:3, 3]
         return out
+
+
+def _turned(fit: FittedTrack, R: Float64Array, root: FloatArray) -> FittedTrack:
+    """Return a fit in axes that are turned by R (T, 3, 3), with its root (T, 3) there."""
+    rotations = fit.rotations.copy()
+    rotations[:, 0] = R @ rotations[:, 0]
+    return replace(fit, rotations=rotations, t_camera_root=root)
 
 
 def camera_travel(
