@@ -80,6 +80,7 @@ class Observed:
     those of the images in the frames that two windows share, and 0 elsewhere. ``anchor`` is the row
     in which the trackers of the next window begin, T if there is none, and ``anchor_regions`` are
     the regions of the people in it. ``cut_rows`` are among the window's own frames.
+    ``picture_changes`` (T,): see `SceneCuts`.
     """
 
     frames: list[int]  # (T,) source frame index
@@ -94,6 +95,7 @@ class Observed:
     anchor: int = 0
     checksums: list[int] = field(default_factory=list)
     anchor_regions: list[Region] = field(default_factory=list)
+    picture_changes: list[float] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.timestamps)
@@ -255,6 +257,7 @@ class FrameObserver:
             len(self._timestamps) if self._anchor is None else self._anchor,
             list(self._checksums),
             self._anchor_regions,
+            list(self._cuts.changes),
         )
 
     def _track(

@@ -68,6 +68,7 @@ class Footage:
     scene_starts: NDArray[np.int64]  # (M,) rows of the frames that begin another scene
     execution: str  # what the networks ran on, for the report
     warnings: list[Notice]
+    picture_changes: Float64Array  # (T,), see `SceneCuts`
 
     @property
     def cuts_s(self) -> list[float]:
@@ -279,6 +280,7 @@ def _footage(job: ObservationJob, path: GivenPath | None, observed: Observed) ->
         scene_starts=observed.scene_starts,
         execution=observed.execution,
         warnings=warnings,
+        picture_changes=np.array(observed.picture_changes),
     )
 
 

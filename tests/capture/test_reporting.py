@@ -20,11 +20,12 @@ from scope.scope_addon.capture.reporting import (
     unused_option_warnings,
     up_warnings,
 )
+from scope.scope_addon.capture.tracking.scene_cuts import SceneCuts
 from scope.scope_addon.capture.world.world_frame import BODIES, LINES
 from scope.scope_addon.options import Place, options_at
 from scope.solver import load_body, rotations
 
-from ..made_motion import made_face, made_motion, rows_of
+from ..made_motion import made_face, made_motion
 
 T = 300
 
@@ -234,32 +235,37 @@ def test_a_preset_that_ones_own_network_ignores_is_said(tmp_path):
     assert unused(tmp_path / "a.png", quality="fast") == []
 
 
-def filmed(motion, shown, noise_px=0.3):
-    """The motion whose body walks across the image, and shows these moments in its frames."""
-    count = len(shown)
-    body_px = np.random.default_rng(1).uniform(-100.0, 100.0, (33, 2))
-    swing_px = 8.0 * np.sin(np.arange(33) + 0.2 * np.asarray(shown)[:, None])
-    noise = np.random.default_rng(2).normal(scale=noise_px, size=(count, 33, 2))
-    places = body_px + noise + 3.0 * np.asarray(shown)[:, None, None]
-    places[..., 0] += swing_px
-    keypoints = np.concatenate([places, np.ones((count, 33, 1))], axis=2)
-    names = np.array([f"point{k}" for k in range(33)])
-    part = rows_of(replace(motion, face={}), slice(0, count))
-    return replace(part, keypoints2d=keypoints.astype(np.float32), keypoints2d_names=names)
+def changes_of(shown, noise=1.0):
+    """The changes of pictures that show these moments of a man who walks through a room, after a
+    compression that changes what stands still by the noise, of 255.
+    """
+    rng = np.random.default_rng(1)
+    room = cv2.resize(rng.integers(0, 256, (9, 16, 3), dtype=np.uint8), (320, 180)).astype(float)
+    cuts = SceneCuts()
+    for k, moment in enumerate(shown):
+        picture = room + noise * np.random.default_rng(k).normal(size=room.shape)
+        x = 40 + round(1.5 * moment)
+        swing = round(12 * np.sin(0.2 * moment))
+        picture[60:120, x : x + 20] = [200, 40, 40]
+        picture[120:160, x + swing : x + swing + 10] = [30, 30, 90]
+        cuts.is_cut(np.clip(picture, 0, 255).astype(np.uint8), None)
+    return np.array(cuts.changes)
 
 
 @pytest.mark.parametrize(
     ("fps", "shown_fps"),
     [(60.0, 30.0), (30.0, 10.0), (30.0, 24.0), (60.0, 50.0), (60.0, 40.0), (24.0, 20.0)]
-    + [(29.97, 23.976), (59.94, 29.97)],
+    + [(29.97, 23.976), (59.94, 29.97), (60.0, 15.0), (60.0, 10.0)],
 )
-def test_frames_that_repeat_the_one_before_are_said(motion, fps, shown_fps):
+def test_frames_that_repeat_the_one_before_are_said(fps, shown_fps):
     """Of a video converted from a lower rate, usual or not; at the rate that is proposed, no frame
     repeats, and no lower one divides the frames so.
     """
     shown = np.floor(np.arange(120) / fps * shown_fps + 1e-6) * fps / shown_fps
-    (warning,) = repetition_warnings("a.mp4", fps, filmed(motion, shown))
+    (warning,) = repetition_warnings("a.mp4", fps, changes_of(shown))
     assert warning.code == "repeated_frames"
+    repeated = 100 * (1 - shown_fps / fps)
+    assert warning.values["percent"] == pytest.approx(repeated, abs=6)
     every = round(fps / warning.values["rate"])
     assert warning.values["rate"] == pytest.approx(fps / every)
     assert (np.diff(shown[::every]) > 1e-6).all()
@@ -267,5 +273,13 @@ def test_frames_that_repeat_the_one_before_are_said(motion, fps, shown_fps):
 
 
 @pytest.mark.parametrize("shown", [np.arange(120), np.zeros(120), np.r_[:60, [59] * 15, 60:105]])
-def test_somebody_who_moves_stands_or_pauses_repeats_no_frames(motion, shown):
-    assert repetition_warnings("a.mp4", 30.0, filmed(motion, shown)) == []
+def test_somebody_who_moves_stands_or_pauses_repeats_no_frames(shown):
+    assert repetition_warnings("a.mp4", 30.0, changes_of(shown)) == []
+
+
+@pytest.mark.parametrize(("fps", "shown_fps"), [(30.0, 24.0), (60.0, 15.0)])
+def test_frames_repeat_too_where_somebody_stands_now_and_then(fps, shown_fps):
+    moments = np.r_[:60, [59] * 60, 60:120]
+    shown = moments[np.floor(np.arange(180) / fps * shown_fps).astype(int) * 2 % 180]
+    (warning,) = repetition_warnings("a.mp4", fps, changes_of(shown))
+    assert warning.values["percent"] == pytest.approx(100 * (1 - shown_fps / fps), abs=8)

@@ -288,6 +288,7 @@ def windows(folder: Path) -> list[bytes]:
         anchor=5,
         checksums=[1] * 6,
         anchor_regions=[Region((1.0, 2.0), 9.0, 0.0)],
+        picture_changes=[1.0] * 6,
     )
     return [save_window(folder, observed).read_bytes()]
 

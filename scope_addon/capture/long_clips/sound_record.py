@@ -32,8 +32,8 @@ def is_sound(observed: Observed) -> bool:
     times = observed.timestamps
     return (
         all(isinstance(index, int) for index in [*observed.frames, *observed.checksums])
-        and len(times) == len(observed.checksums) == frames
-        and all(map(math.isfinite, times))
+        and len(times) == len(observed.checksums) == len(observed.picture_changes) == frames
+        and all(map(math.isfinite, [*times, *observed.picture_changes]))
         and all(a < b for a, b in pairwise(times))
         and 0 <= observed.first <= observed.anchor <= frames
         and _are_rows(observed.cut_rows, observed.first, frames)

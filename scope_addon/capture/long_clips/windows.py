@@ -113,6 +113,7 @@ class JoinedWindows:
         frames: list[int] = []
         timestamps: list[float] = []
         cut_rows: list[int] = []
+        changes: list[float] = []
         notices = list(warnings)
         for part in self._parts:
             first = part.first
@@ -120,6 +121,7 @@ class JoinedWindows:
             shift = frames[base - first] - part.frames[0] if 0 < first <= base else 0
             frames += [index + shift for index in part.frames[first:]]
             timestamps += part.timestamps[first:]
+            changes += part.picture_changes[first:]
             cut_rows += [base + row - first for row in part.cut_rows]
             notices += [each for each in part.warnings if each not in notices]
         background = joined_backgrounds(
@@ -127,7 +129,14 @@ class JoinedWindows:
         )
         people = dict(enumerate(self._people))
         return Observed(
-            frames, timestamps, cut_rows, people, background, execution or self._execution, notices
+            frames,
+            timestamps,
+            cut_rows,
+            people,
+            background,
+            execution or self._execution,
+            notices,
+            picture_changes=changes,
         )
 
     def _continue(

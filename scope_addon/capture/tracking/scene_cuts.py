@@ -43,9 +43,15 @@ MAX_NOT_BLENDED = 0.2  # share of a frame's pattern, as squares, that the two do
 
 
 class SceneCuts:
-    """Detects cuts in frames that come in order."""
+    """Detects cuts in frames that come in order.
+
+    ``changes``: of each frame so far, the largest change of a place in it from the frame before, of
+    255; 0 for the first.
+    """
 
     def __init__(self) -> None:
+        self.changes: list[float] = []
+        self._last: Float32Array | None = None
         self._before: Float32Array | None = None
         self._upcoming: Float32Array | None = None
         self._is_after_gap = False  # blank frames follow `_before`
@@ -60,6 +66,9 @@ class SceneCuts:
         """
         now = _thumbnail(image_rgb) if self._upcoming is None else self._upcoming
         self._upcoming = None if upcoming_rgb is None else _thumbnail(upcoming_rgb)
+        last = now if self._last is None else self._last
+        self.changes.append(float(np.abs(now - last).max()))
+        self._last = now
         before = self._before
         self._before = now
         self._recent.append(now)

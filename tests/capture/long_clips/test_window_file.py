@@ -85,6 +85,7 @@ def record(seed: int = 0) -> Observed:
         9,
         sums,
         [region],
+        rng.random(FRAMES).tolist(),
     )
 
 
@@ -144,6 +145,8 @@ def test_a_file_without_an_array_or_with_another_version_s_text_counts_for_nothi
         lambda r: r.tracklets[4].references.__setitem__(0, (99, known_reference(None))),
         lambda r: r.anchor_regions.__setitem__(0, Region((0.0, 0.0), -1.0, 0.0)),
         lambda r: r.timestamps.__setitem__(4, 0.0),
+        lambda r: r.picture_changes.__setitem__(4, np.nan),
+        lambda r: r.picture_changes.pop(),
         lambda r: setattr(r, "background", None),
         lambda r: setattr(r, "first", FRAMES + 1),
         lambda r: r.cut_rows.__setitem__(0, 0),
