@@ -39,6 +39,9 @@ _FK_BONUS = 0.5
 _MAX_COLLAR = 0.4
 # Bones are at one place if their distance is below this share of the rig's size.
 _NEAR = 0.005
+# Lengths of mirror images differ by no more than this share.
+_ALIKE = 0.03
+_SLIGHT = 0.01  # The weight of a bone without a mirror image.
 # The tip of a head is above it by more than this multiple of the neck's bones.
 _TIP_LENGTH = 1.4
 
@@ -59,8 +62,9 @@ def guess(rest: RestPose, *, is_mirrored: bool = False) -> BoneMap:
         named = {}
     parts = named | _lacking(named, shaped)
     backwards = faces_backwards(_heads_of(rest, parts))
-    is_exchanged = backwards if backwards is not None else is_mirrored and bool(named)
-    if is_exchanged:
+    if backwards is None:
+        backwards = is_mirrored and any(name.side for name in parse_names(rest.names))
+    if backwards:
         parts = {bone: other_side(part) for bone, part in parts.items()}
     if rigify is None:
         for bone, part in find_fingers(rest, parts).items():
@@ -72,7 +76,7 @@ def guess(rest: RestPose, *, is_mirrored: bool = False) -> BoneMap:
         else SHAPED
         if bone not in named and part.partition("_")[2] not in PHALANGES
         else _AGREED
-        if shaped.get(bone) == part and not is_exchanged
+        if shaped.get(bone) == part and not backwards
         else _NAMED
         for bone, part in parts.items()
     }
@@ -386,10 +390,35 @@ def _places(rest: RestPose) -> tuple[Float64Array, Float64Array]:
     """Return how high and how far to the left each bone begins, as shares of the rig's height."""
     heads = rest.heads
     height = max(float(np.ptp(heads[:, 2])), 1e-9)
-    axis = int(np.argmax(np.ptp(heads[:, :2], axis=0)))  # The arms extend along the wider axis.
-    leftwards = heads[:, axis] - np.median(heads[:, axis])
-    leftwards = leftwards if axis == 0 else -leftwards
+    leftwards = heads[:, :2] @ _sideways(rest)
+    leftwards -= np.median(leftwards)
+    signs = {"left": 1.0, "right": -1.0, "": 0.0}
+    named = leftwards @ [signs[name.side] for name in parse_names(rest.names)]
+    if named < 0.0:
+        leftwards = -leftwards
     return (heads[:, 2] - heads[:, 2].min()) / height, leftwards / height
+
+
+def _sideways(rest: RestPose) -> Float64Array:
+    """Return the horizontal axis (2,) from side to side, whichever way the rig is turned: that
+    which leads from bones to those that may be their mirror images, as long as they are, at the end
+    of chains of the same length.
+    """
+    places = rest.heads[:, :2]
+    lengths = np.linalg.norm(rest.heads - rest.heads[rest.parents], axis=1)
+    lengths[rest.parents < 0] = 0.0
+    reaches = np.array([lengths[chain].sum() for chain in rest.chains])
+    around = places - places.mean(axis=0)
+    spread = _SLIGHT * around.T @ around  # the arms tell, where no bone has a mirror image
+    for bone, (length, reach) in enumerate(zip(lengths, reaches, strict=True)):
+        is_alike = abs(lengths - length) <= _ALIKE * length
+        is_alike &= abs(reaches - reach) <= _ALIKE * reach
+        apart = places[is_alike] - places[bone]
+        spread += apart.T @ apart
+    x, y = np.linalg.eigh(spread)[1][:, -1]
+    # Without names and toes, a rig is taken to look along -y rather than y, and along -x.
+    sign = np.sign(x if abs(x) >= abs(y) else -y)
+    return sign * np.array([x, y])
 
 
 def _limb_chains(

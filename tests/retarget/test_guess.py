@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.retarget.guess import by_geometry, by_name, guess
 from scope.scope_addon.retarget.rest_pose import RestPose
+from scope.solver.rotations import exp
 
 from .naming_schemes import PARENTS, PLACES, SCHEMES, SIDED, names_of
 
@@ -80,3 +81,43 @@ def test_an_arm_of_a_single_bone_has_no_joints_but_a_shoulder():
     assert found["q7"] == "left_shoulder"
     assert found["q8"] == "right_shoulder"
     assert found["q2"] == "left_knee"
+
+
+@pytest.mark.parametrize("tilt", [0.0, -0.35, 0.35])
+@pytest.mark.parametrize("drop", [0.0, 0.8])
+def test_a_rig_has_the_same_map_whichever_way_it_is_turned(drop: float, tilt: float) -> None:
+    """Standing, or leaning back or forward."""
+    bones, part_of = bones_of("nameless", drop=drop)
+    leaning = bones.heads @ exp(np.array([tilt, 0.0, 0.0])).T
+    for angle in np.radians([*range(0, 360, 15), 42, 48, 133, 137]):
+        turned = leaning @ exp(np.array([0.0, 0.0, angle])).T
+        found = guess(RestPose(bones.names, bones.parents, turned))
+        assert found.parts == part_of, np.degrees(angle)
+
+
+def test_a_tail_does_not_tell_the_sides() -> None:
+    """Though it is longer than the arms."""
+    bones, part_of = bones_of("nameless", drop=0.8)
+    places = [(0.0, 0.1 + 0.25 * k, 0.9 - 0.01 * k) for k in range(8)]
+    rows = len(bones.names) + np.arange(len(places))
+    rest = RestPose(
+        [*bones.names, *(f"tail{row}" for row in rows)],
+        np.array([*bones.parents, bones.names.index(names_of("nameless")["pelvis"]), *rows[:-1]]),
+        np.array([*bones.heads, *places]),
+    )
+    assert guess(rest).parts == part_of
+
+
+@pytest.mark.parametrize("angle", np.radians([0, 80, 135, 180, 300]))
+def test_names_tell_the_sides_of_a_rig_without_toes(angle: float) -> None:
+    """Names that tell nothing but the side."""
+    bones, part_of = bones_of("nameless")
+    kept = [row for row, bone in enumerate(bones.names) if not part_of[bone].endswith("_foot")]
+    sides = {"left": "_L", "right": "_R"}
+    names = [f"q{row}{sides.get(part_of[bones.names[row]].partition('_')[0], '')}" for row in kept]
+    parents = [kept.index(parent) if parent >= 0 else -1 for parent in bones.parents[kept]]
+    heads = bones.heads[kept] @ exp(np.array([0.0, 0.0, angle])).T
+    found = guess(RestPose(names, np.array(parents), heads))
+    assert found.parts == {
+        name: part_of[bones.names[row]] for name, row in zip(names, kept, strict=True)
+    }
