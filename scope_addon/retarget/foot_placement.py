@@ -6,7 +6,7 @@ The goals of the ankles allow for feet that differ in shape from the body's. A f
 the heel onto the ball rotates about the one that is on the floor, and that point must not move. The
 ankle follows from either point i, heel or ball:
 
-    a_i = G(p_i) + Y c_i − D q_i,      c_i = q_i − t s_i, with its height set to 0,
+    a_i = G(p_i) + Y c_i − E q_i + h,      c_i = q_i − t s_i, with its height set to 0,
 
     p_i   the point on the body, metres, world frame
     s_i   from the body's ankle to the point, at rest;  q_i: the same on the rig
@@ -15,10 +15,14 @@ ankle follows from either point i, heel or ball:
     G(p)  t p, but the height is that of the rig's point at rest plus s times the rise of p above
           its height at rest
     D, Y  rotation of the foot from rest, and its rotation about the vertical alone (heading)
+    E     D, but a foot that is longer than the body's, scaled, is pitched less: otherwise its ankle
+          would rise too far for its leg
+    h     from t times the body's hip to the rig's, on the floor: so legs have the directions of the
+          body's, however wide the hips are; constant, or nearly so, while the foot rests
 
 So a point that is at rest on the body is at rest on the rig. On a flat foot both goals are the
-same: t times the body's ankle, at the height of the rig's ankle; so a longer foot extends at both
-ends, and nothing jumps. The two goals are blended by a logistic function of the difference in
+same: h from t times the body's ankle, at the height of the rig's ankle; so a longer foot extends at
+both ends, and nothing jumps. The two goals are blended by a logistic function of the difference in
 height of the points, in favour of the lower one. Neither point penetrates the floor, even where the
 captured foot does, unless the person is on a lower floor.
 """
@@ -33,9 +37,11 @@ from ...solver.body import Body
 from ...solver.rotations import exp, shortest_turn
 from ..arrays import BoolArray, Float64Array, FloatArray
 from ..edit.clip import Clip, about_z
-from ..kinematics.axes import UP, rotated
+from ..kinematics.axes import UP, rotated, transposed
 from ..kinematics.foot_skin import FootSkin, lower_floors
 from ..kinematics.leg_reach import cross, knee_turn
+from ..kinematics.sequences import runs
+from ..kinematics.smoothing import fill_gaps, gaussian_smooth
 from ..kinematics.standing import standing_probability
 from .rest_pose import Pose, Skeleton, head_positions
 
@@ -47,6 +53,10 @@ _SIDES = ("left", "right")
 _MAX_STRETCH = 0.9999  # Share of the leg's length beyond which the knee would snap.
 _LEVEL = np.array([1.0, 1.0, 0.0])
 _SOFT_M = 0.004  # Scale of the logistic function of the difference in height of heel and ball.
+# Slower changes of h are followed while a foot rests: somebody may turn without taking steps.
+_STANCE_HZ = 0.3
+# Feet whose toes point down by more than 60 degrees lie or kneel: from there on, the pitch is kept.
+_STEEP = 2.0
 _DROP_S = 4 / 30  # Time before and after, over which the pelvis is lowered.
 
 
@@ -60,6 +70,7 @@ class Legs:
     knees: list[int]
     ankles: list[int]
     joints: list[int]  # the body's ankles
+    sockets: list[int]  # the body's hips
     toed: list[int]  # the legs that have a bone for the toes
     toes: list[int]  # these bones
     # (len(toed), 3, 3) A_b F R_b of these bones, as in ``transfer.py``
@@ -115,6 +126,7 @@ def legs_at_rest(
         knees=knees,
         ankles=ankles,
         joints=[body.joint_names.index(f"{side}_ankle") for side in sides],
+        sockets=[body.joint_names.index(f"{side}_hip") for side in sides],
         toed=toed,
         toes=toes,
         toes_in_t_pose=alignment[toes] @ rig.rotations[toes],
@@ -185,16 +197,19 @@ def place_feet(
     world = pose.rotations
     heads = pose.heads
     turns = bone_turns[:, legs.ankles]
+    rig_turns = _less_pitched(legs, turns)
+    world[:, legs.ankles] = rig_turns @ transposed(turns) @ world[:, legs.ankles]
     goals = ankle_goal(
         legs.body,
         legs.rig,
         legs.scales,
-        turns,
+        (turns, rig_turns),
         joints[:, legs.joints],
         one_floor=one_floor[:, None],
     )
+    goals += _stance(legs, heads, turns, joints, times)
     if legs.toed and one_floor.any():
-        balls = (goals + rotated(turns, legs.rig.ball))[one_floor][:, legs.toed]
+        balls = (goals + rotated(rig_turns, legs.rig.ball))[one_floor][:, legs.toed]
         rested = (legs.rig.height + legs.rig.ball[:, 2])[legs.toed]
         flat = flat_toes(bone_turns[one_floor][:, legs.toes], legs.tips, balls, rested)
         rows = np.flatnonzero(one_floor)
@@ -209,6 +224,49 @@ def place_feet(
     placed = head_positions(rig, world)
     first = legs.hips[0]
     heads[:] = placed + (heads[:, first] - placed[:, first])[:, None]
+
+
+def _less_pitched(legs: Legs, turns: Float64Array) -> Float64Array:
+    """Return E (T, L, 3, 3) of the feet's rotations D; a foot that points steeply down keeps its
+    pitch.
+    """
+    lengths = np.linalg.norm(legs.rig.ball[:, :2], axis=1)
+    wanted = legs.scales[2] * np.linalg.norm(legs.body.ball[:, :2], axis=1)
+    excess = 1.0 - np.minimum(wanted / lengths, 1.0)
+    pitch = turns[..., 2, 1] * np.clip(_STEEP * turns[..., 2, 2], 0.0, 1.0)
+    return exp(-(excess * pitch)[..., None] * turns[..., 0]) @ turns
+
+
+def _stance(
+    legs: Legs,
+    heads: Float64Array,
+    turns: Float64Array,
+    joints: Float64Array,
+    times: Float64Array,
+) -> Float64Array:
+    """Return h (T, L, 3), metres.
+
+    :param heads: (T, B, 3) of the rig, metres, world frame.
+    :param turns: (T, L, 3, 3) D of the feet.
+    :param joints: (T, K+1, 3) of the body, metres, world frame.
+    :param times: (T,) seconds.
+    """
+    offset = (heads[:, legs.hips] - legs.scales * joints[:, legs.sockets]) * _LEVEL
+    stands = [
+        # A foot that is slow at any height may be held there, too.
+        standing_probability(point, UP, times, uneven_ground=True)
+        for at in (legs.body.heel, legs.body.ball)
+        for point in [joints[:, legs.joints] + rotated(turns, at)]
+    ]
+    rests = np.maximum(*stands) > 0.5
+    for leg, of_leg in enumerate(rests.T):
+        held = np.zeros_like(offset[:, leg])
+        for span in (slice(*run) for run in runs(of_leg)):
+            mean = gaussian_smooth(offset[span, leg], times[span], _STANCE_HZ)
+            held[span] = mean - offset[span, leg]
+        if of_leg.any():
+            offset[:, leg] += fill_gaps(held, of_leg, times)
+    return offset
 
 
 def frames_on_one_floor(clip: Clip, body: Body, betas: FloatArray) -> BoolArray:
@@ -284,7 +342,7 @@ def ankle_goal(
     source: FootRest,
     rig: FootRest,
     scales: Float64Array,
-    turn: Float64Array,
+    turns: tuple[Float64Array, Float64Array],
     ankle: Float64Array,
     one_floor: BoolArray,
 ) -> Float64Array:
@@ -293,19 +351,20 @@ def ankle_goal(
     :param source: the body's feet.
     :param rig: the rig's feet.
     :param scales: (3,), t, t and s.
-    :param turn: (..., 3, 3) D, the rotation of both feet from rest.
+    :param turns: (..., 3, 3) D and E, the rotations of the body's feet and the rig's from rest.
     :param ankle: (..., 3) the body's, metres.
     :param one_floor: (...) where feet are kept above the floor.
-    :return: (..., 3) metres.
+    :return: (..., 3) metres, without h.
     """
     # About the vertical alone, from the sideways axis, which stays horizontal.
+    turn, rig_turn = turns
     yaw = about_z(np.arctan2(turn[..., 1, 0], turn[..., 0, 0])).reshape(turn.shape)
     goals = []
     heights = []
     rolled = []
     for s, q in ((source.heel, rig.heel), (source.ball, rig.ball)):
         point = ankle + rotated(turn, s)
-        rig_point = rotated(turn, q)
+        rig_point = rotated(rig_turn, q)
         # The height above its rest position on the floor.
         above = point[..., 2] - (source.height + s[..., 2])
         place = scales * point

@@ -70,17 +70,19 @@ def foot(side, step):
     return ankle, turn, pitch(-22 * ease), False, False
 
 
-def rolling_walk(seconds=2.6, stiff_toes=False):
+def rolling_walk(seconds=2.6, stiff_toes=False, pelvis_turn=0.0):
     """Return the clip, and per side the contact of heel and ball: (T, 2) bool.
 
     :param stiff_toes: keep the toes from bending, as in a capture without toe keypoints.
+    :param pelvis_turn: degrees by which the pelvis turns to either side with every step.
     """
     times = np.arange(int(seconds * RATE) + 1) / RATE
     height = -FLOOR - 0.07 + 0.015 * np.cos(4 * np.pi * times / PERIOD)
     ahead = -STRIDE * (times / PERIOD - 0.5 * STANCE + 0.04)
     root = J[0] + np.stack([np.zeros(len(times)), ahead, height], axis=1)
     rotations = np.tile(np.eye(3), (len(times), len(NAMES), 1, 1))
-    rotations[:, 0] = R_WORLD_MODEL
+    turns = np.radians(pelvis_turn) * np.sin(2 * np.pi * times / PERIOD)
+    rotations[:, 0] = exp(turns[:, None] * [0.0, 0.0, 1.0]) @ R_WORLD_MODEL
     for name, vector in ARMS_DOWN.items():
         rotations[:, NAMES.index(name)] = exp(np.array(vector))
     ankles = np.empty((len(times), 2, 3))

@@ -5,14 +5,19 @@ poses.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
+from scope.scope_addon.kinematics.sequences import runs
 from scope.scope_addon.retarget.foot_placement import frames_on_one_floor
+from scope.scope_addon.retarget.rest_pose import Skeleton
 from scope.scope_addon.retarget.transfer import Transfer
 from scope.solver.rotations import exp
 
+from ..edit.rolling import rolling_walk
 from ..edit.walking import BETAS, BODY, NAMES, walk
 from .made_skeletons import MAPPED, VERTICAL, body_rig, direction, same_names, turn_between
 
@@ -110,3 +115,44 @@ def test_limbs_of_a_rig_in_an_a_pose_point_where_the_bodys_do(feet: bool) -> Non
         assert off.max() < np.radians(
             0.01 if not feet or "shoulder" in first or "elbow" in first else 3.0
         )
+
+
+def proportioned(hips: float, legs: float, feet: float) -> Skeleton:
+    """Return the body's own skeleton with multiples of the distance of its hips, of the length of
+    its legs and of that of its feet.
+    """
+    rig = body_rig()
+    heads = rig.heads.copy()
+    for side in ("left", "right"):
+        rows = [MAPPED.index(f"{side}_{part}") for part in ("hip", "knee", "ankle", "foot")]
+        steps = np.diff(rig.heads[rows], axis=0) * np.array([[legs], [legs], [1.0]])
+        steps[2, :2] *= feet
+        steps = np.concatenate([rig.heads[rows[:1]] * [hips, 1.0, 1.0], steps])
+        heads[rows] = np.cumsum(steps, axis=0)
+    moved = heads - rig.heads
+    floor = rig.floor + moved[MAPPED.index("left_ankle"), 2]
+    return replace(rig, heads=heads, ends=rig.ends + moved, floor=floor)
+
+
+@pytest.mark.parametrize(
+    ("hips", "legs", "feet"),
+    [(2.2, 1.0, 1.0), (1.0, 0.45, 1.0), (1.8, 0.5, 1.2), (1.5, 0.6, 0.6), (0.3, 1.3, 1.0)],
+)
+def test_legs_of_other_proportions_point_where_the_bodys_do_and_their_feet_stay_in_place(
+    hips: float, legs: float, feet: float
+) -> None:
+    """Though the pelvis, and the hips with it, turns with every step."""
+    clip, stands = rolling_walk(pelvis_turn=8.0)
+    rig = proportioned(hips, legs, feet)
+    heads = Transfer(BODY, BETAS, rig, same_names()).pose(clip).heads
+    joints = clip.joints(BODY, BETAS)[:, [NAMES.index(name) for name in MAPPED]]
+    for side, contact in stands.items():
+        for first, second in ((f"{side}_hip", f"{side}_knee"), (f"{side}_knee", f"{side}_ankle")):
+            ours = direction(heads, first, second, MAPPED)
+            off = turn_between(ours, direction(joints, first, second, MAPPED))
+            assert off.max() < np.radians(6.0), first
+        row = MAPPED.index(f"{side}_foot")
+        for begin, end in runs(contact[:, 1]):
+            ball = heads[begin:end, row]
+            assert np.ptp(ball[:, :2], axis=0).max() < 0.01
+            np.testing.assert_allclose(ball[:, 2], rig.heads[row, 2] - rig.floor, atol=0.01)
