@@ -41,6 +41,7 @@ def test_a_clip_filmed_sideways_and_in_slow_motion(
     (motion,) = result.motions
     assert motion.footage_rotation == 90
     assert motion.mocap_framerate == 60.0
+    assert result.report.frame_rate == [60, 1]
     np.testing.assert_allclose(np.diff(motion.timestamps), 1 / 60, atol=1e-3)
     np.testing.assert_allclose(np.diff(motion.footage_times_s), 1 / 30, atol=2e-3)
     assert motion.image_size.tolist() == list(sample_frames[0].shape[1::-1])

@@ -367,6 +367,17 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
     if wanted.fps is not None:
         video._source_fps = fps
         video.fps = min(wanted.fps, fps)
+        even_fps = fps / round(fps / video.fps)
+        if _varies(video.fps, even_fps):
+            video.warnings.append(
+                notice(
+                    "uneven_frames",
+                    footage=path.name,
+                    rate=float(fps),
+                    wanted=float(wanted.fps),
+                    even=float(even_fps),
+                )
+            )
         if wanted.fps > fps:
             video.warnings.append(
                 notice(

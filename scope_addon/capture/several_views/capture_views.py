@@ -30,7 +30,7 @@ from ..observe import Footage, Watch, observe
 from ..options import CaptureOptions, check_options
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..pipeline import Capture, repaired, shot_of
-from ..reporting import make_report, speed_warnings
+from ..reporting import make_report, repetition_warnings, speed_warnings
 from ..solve import progress_of_person, solve_people
 from ..tracking.track import Track
 from ..world.assemble import Shot
@@ -554,7 +554,13 @@ def _about_footage(
     """
     warnings: list[Notice] = []
     for view in views:
-        for warning in (*view.footage.warnings, *speed_warnings(view.video, options)):
+        name = Path(view.video.path).name
+        changes = view.footage.picture_changes
+        for warning in (
+            *view.footage.warnings,
+            *repetition_warnings(name, float(view.video.fps), changes),
+            *speed_warnings(view.video, options),
+        ):
             is_said = warning in said or warning in warnings
             if not is_said and warning.code != "seen_briefly":
                 warnings.append(warning)

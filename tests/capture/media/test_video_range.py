@@ -77,6 +77,20 @@ def test_resampled(long_video: Path) -> None:
         assert "60" in str(video.warnings[0])
 
 
+@pytest.mark.parametrize(("fps", "even"), [(10, 12.5), (20, 25), (24, 25), ("25/2", 0), (25, 0)])
+def test_frames_that_are_not_evenly_apart_are_said(
+    long_video: Path, fps: int | str, even: float
+) -> None:
+    with open_video(long_video, VideoRange(1.0, 3.0, Fraction(fps))) as video:
+        steps_s = np.diff([frame.timestamp_s for frame in video])
+    assert np.allclose(steps_s, float(1 / Fraction(fps)), atol=1e-6) == (even == 0)
+    assert [str(each) for each in video.warnings] == [
+        f"{long_video.name} has 25 frames per second, of which {fps} are not evenly apart. The "
+        "keys have the exact times of its frames, so some lie between the scene's frames; "
+        f"--fps {even:g} takes frames that are"
+    ] * (even > 0)
+
+
 def test_a_start_after_the_end_of_the_video(long_video: Path) -> None:
     with pytest.raises(VideoError, match="60.0 s"):
         open_video(long_video, VideoRange(100))

@@ -104,14 +104,18 @@ def test_warnings_about_every_video_are_said_once():
     slower = notice("execution", text="slow")
     views = [
         SimpleNamespace(
-            footage=SimpleNamespace(warnings=warnings),
-            video=SimpleNamespace(path=f"{name}.mp4", recorded_speed=speed),
+            footage=SimpleNamespace(warnings=warnings, picture_changes=np.array(changes)),
+            video=SimpleNamespace(path=f"{name}.mp4", recorded_speed=speed, fps=30),
         )
-        for name, warnings, speed in (("b", [damaged, slower], 1.0), ("c", [slower], 8.0))
+        for name, warnings, speed, changes in (
+            ("b", [damaged, slower], 1.0, [0.0, 9.0] * 20),
+            ("c", [slower], 8.0, [9.0] * 40),
+        )
     ]
     found = several._about_footage(views, CaptureOptions(), [slower])
-    assert [each.code for each in found] == ["decoding_stopped", "slow_motion"]
-    assert several._about_footage(views, CaptureOptions(speed=1.0), [slower]) == [damaged]
+    codes = ["decoding_stopped", "repeated_frames", "slow_motion"]
+    assert [each.code for each in found] == codes
+    assert several._about_footage(views, CaptureOptions(speed=1.0), [slower]) == found[:2]
 
 
 def test_warnings_advise_only_what_several_cameras_can_have(videos, monkeypatch):
