@@ -60,6 +60,8 @@ STILL = OUT / "still.npz"
 LOW = OUT / "low.npz"
 FRAMES = 120
 RATE = 60.0
+# By its code: for the name, xdotool holds Alt where the keyboard's layout has F3 on several levels.
+F3 = "69"
 # words, how many of Blender's own entries they find first, the operator after these, and its format
 SEARCHED = (
     ("motion capture", 2, "import_video", ""),
@@ -207,7 +209,7 @@ def searched() -> Iterator[float]:
     windows = bpy.context.window_manager.windows
     for number, (words, others, operator, form) in enumerate(SEARCHED):
         before = popup()
-        key("F3")
+        key(F3)
         yield from until(lambda empty=before: popup() != empty, 20, "the search")
         before = popup()
         subprocess.Popen(["xdotool", "type", "--delay", "60", words])
