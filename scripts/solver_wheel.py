@@ -81,7 +81,7 @@ solver.fit(body, image)
 solver.fit(body, everything, init=first.state)
 solver.linearize(body, everything, first.state)
 solver.gauss_newton_step(body, everything, first.state)
-clip = solver.fit_clip(body, [image, everything], temporal=solver.Temporal(), focal=True)
+clip = solver.fit_clip(body, [image, everything], focal=True)
 views = [[solver.View(image), solver.View(image, np.eye(3), [0.0, 0.0, 0.001])]] * 6
 stands = solver.StandingPoints([coco[15]], np.ones((6, 1)))
 solver.fit_motion(body, views, np.arange(6) / 30.0, stands=stands, covariance=True)

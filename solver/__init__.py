@@ -67,8 +67,6 @@ if TYPE_CHECKING:  # the public names and their modules, in the only place that 
     from .state import Fit as Fit
     from .state import State as State
     from .state import Status as Status
-    from .temporal import Temporal as Temporal
-    from .temporal import with_previous as with_previous
     from .tree import BodyArrays as BodyArrays
     from .tree import Tree as Tree
     from .tree import make_tree as make_tree

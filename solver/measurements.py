@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import as_array, as_integers, as_numbers, described, has_axis
+from .arrays import as_array, as_numbers, described, has_axis
 from .errors import InvalidValueError, ShapeError
 from .kernel import kernel
 from .part import Array
@@ -353,25 +353,13 @@ def _sigmas(value: ArrayLike, n: int, name: str) -> Array:
 _FIELDS = {"pose_prior": "pose_priors", "foot_contact": "foot_contacts", "floor": "floor"}
 
 
-def pose_prior_arrays(m: PosePriors) -> tuple[Array, Array, Array, Array, Array]:
-    """Return parts (n,), R (n, 3, 3), t (n, 3), and weights of rotation and of translation (n,).
-
-    :raises ShapeError: an array has another shape.
-    """
-    parts = as_integers(m.parts, "Parts of pose priors")
-    n = len(parts)
-    return (
-        parts,
-        as_array(m.R_camera_part, (n, 3, 3), "Rotations of pose priors"),
-        as_array(m.t_camera_part, (n, 3), "Positions of pose priors"),
-        as_array(m.weight_rotation, (n,), "Rotation weights of pose priors"),
-        as_array(m.weight_translation, (n,), "Translation weights of pose priors"),
-    )
-
-
 def _pose_prior_rows(m: PosePriors, K: int) -> tuple[Array, Array]:
-    parts, R, t, w_R, w_t = pose_prior_arrays(m)
-    parts = as_indices(parts, K + 1, "Parts of pose priors")
+    parts = as_indices(m.parts, K + 1, "Parts of pose priors")
+    n = len(parts)
+    R = as_array(m.R_camera_part, (n, 3, 3), "Rotations of pose priors")
+    t = as_array(m.t_camera_part, (n, 3), "Positions of pose priors")
+    w_R = as_array(m.weight_rotation, (n,), "Rotation weights of pose priors")
+    w_t = as_array(m.weight_translation, (n,), "Translation weights of pose priors")
     check_not_negative(w_R, "Rotation weights of pose priors")
     check_not_negative(w_t, "Translation weights of pose priors")
     check_rotations(R, "Rotations of pose priors", w_R)

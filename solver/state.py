@@ -149,7 +149,7 @@ class Fit:
     it, with Options.report only. iterations: evaluations of the blocks after the first; rejected:
     of them, those whose step did not lower the cost. beta_information (P, P): of this frame's
     measurements alone, pose eliminated; shape prior not included. measurements: usable points,
-    directions, rows of pose priors, such as the pull of `Temporal`, contacts, points above a floor,
+    directions, rows of pose priors, contacts, points above a floor,
     and rows of further tables; seen: of them, the points, directions and rows of pose priors.
     """
 

@@ -38,7 +38,6 @@ from ..points import frames_of
 from ..residuals.external import raise_failure
 from ..residuals.registry import SHAPE_PRIOR
 from ..state import ClipFit, Fit, State, Status, given_states
-from ..temporal import Temporal, with_previous
 from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..validation import check_count, check_switch, check_type, check_weight
 from .frame_solver import cost_by_term, fit_at, fit_tree
@@ -78,7 +77,6 @@ def fit_clip(
     init: Sequence[State] | Literal["multi"] | None = None,
     priors: Priors | None = None,
     options: Options = Options(),  # noqa: B008 - frozen
-    temporal: Temporal | None = None,
     focal: bool = False,
     focal_weight: float = 1.0,
     shape_frames: int = 500,
@@ -88,10 +86,9 @@ def fit_clip(
     First every frame is fitted in order, from the frame before and with the shape's information
     carried along (not if `init` is given; with "multi", as `fit` does where the person appears);
     then all poses and the shape are optimized together.
-    `temporal` adds the pull towards the frame before, as it came out of the first pass. A frame
-    without measurements gets the pose of the last frame before it that has some, or of the first
-    after it; its status is `NO_MEASUREMENTS`. With `temporal` the pull is a measurement of its own:
-    see `Fit.measurements`. `focal_weight` is a prior on the squared logarithm of the focal scale.
+    A frame without measurements gets the pose of the last frame before it that has some, or of the
+    first after it; its status is `NO_MEASUREMENTS`. `focal_weight` is a prior on the squared
+    logarithm of the focal scale.
     At most `shape_frames` frames, evenly spaced, decide the shape; the others are then fitted with
     it fixed.
 
@@ -112,16 +109,9 @@ def fit_clip(
     states, cold = given_states(init, len(measurements))
     by_default = priors is None and states is None
     priors = given_priors(body, priors, options)
-    check_type(temporal, (Temporal, type(None)), "temporal")
     tree = make_tree(body)
     if states is None:
-        states = fit_in_order(tree, measurements, priors, options, temporal, cold=cold)
-    given = measurements
-    if temporal is not None:
-        pulled = [
-            with_previous(m, s, temporal) for m, s in zip(measurements[1:], states, strict=False)
-        ]
-        measurements = [measurements[0], *pulled]
+        states = fit_in_order(tree, measurements, priors, options, cold=cold)
     clip_tree = make_tree(body, focal)
     packed = pack_priors(clip_tree, priors)
     terms = [fill_terms(clip_tree, m, packed, None)[0] for m in measurements]
@@ -156,10 +146,7 @@ def fit_clip(
     for k in seen:
         if k not in by_frame:
             by_frame[k] = alone(k, states[k])
-    # that was measured: the pull towards the frame before does not say where anyone is
-    measured = (k for k in seen if usable(fill_terms(clip_tree, given[k], packed, None)[0])[1])
-    first = next(measured, None)
-    last = None if first is None else by_frame[first].state
+    last = by_frame[seen[0]].state if seen else None
     for k, state in enumerate(states):
         if k in by_frame:
             last = by_frame[k].state
@@ -167,7 +154,7 @@ def fit_clip(
             by_frame[k] = alone(k, state if last is None else last)
     fits = [by_frame[k] for k in range(len(states))]
     if by_default and not warn_of_mirrored_clip(
-        given, fits, priors, lambda m: fit_tree(tree, m, None, priors, options)
+        measurements, fits, priors, lambda m: fit_tree(tree, m, None, priors, options)
     ):
         warn_of_unlikely_shape([beta], priors)
     shares = joint.cost_by_term(joint_fits) if options.report else {}
@@ -194,7 +181,6 @@ def fit_in_order(
     measurements: Sequence[Measurements],
     priors: Priors,
     options: Options,
-    temporal: Temporal | None,
     cameras: Sequence[Camera] | None = None,
     cold: Literal["multi"] | None = None,
 ) -> list[State]:
@@ -216,8 +202,7 @@ def fit_in_order(
     weight = options.schedule(cold=False)[-1].weights.shape
     for m, (R, t) in zip(measurements, cameras or [_AT_ORIGIN] * len(measurements), strict=True):
         start = None if last is None else _moved(last, R, t)
-        pulled = m if temporal is None or start is None else with_previous(m, start, temporal)
-        fitted = fit_tree(tree, pulled, cold if start is None else start, priors, options)
+        fitted = fit_tree(tree, m, cold if start is None else start, priors, options)
         state = _moved(fitted.state, R.T, -R.T @ t)
         if fitted.status is Status.NO_MEASUREMENTS:
             states.append(states[-1] if seen else state)

@@ -39,7 +39,7 @@ def initial_states(
     chosen = [first_view(views, len(tree.point_part)) for views in frames]
     cameras = [_camera_of(view) for view in chosen]
     states = fit_in_order(
-        tree, [view.measurements for view in chosen], priors, options, None, cameras, cold
+        tree, [view.measurements for view in chosen], priors, options, cameras, cold
     )
     return [replace(state, beta=states[-1].beta) for state in states]
 

@@ -32,7 +32,6 @@ from scope.solver import (
     StandingPoints,
     State,
     Status,
-    Temporal,
     View,
     Weights,
     rotations,
@@ -116,7 +115,7 @@ def _checked(**arguments: Any) -> Any:
 
 
 HOW: dict[str, Any] = {"priors": PRIORS, "options": SHORT}
-CLIPS = {"body": BODY, "temporal": Temporal(), "focal": False, "focal_weight": 1.0} | HOW
+CLIPS = {"body": BODY, "focal": False, "focal_weight": 1.0} | HOW
 PIXELS = {"indices": np.arange(M), "pixels": project(POINTS), "confidence": np.ones(M)}
 STATE = {"R_camera_root": TURN, "t_camera_root": np.ones(3)}
 STATE |= {"Omega": np.tile(TURN, (K, 1, 1)), "beta": np.zeros(P)}
@@ -177,7 +176,6 @@ CALLS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     "Weights": (Weights, vars(Weights())),
     "Stage": (Stage, vars(Stage())),
     "Options": (lambda **a: _moved(options=Options(**a)), vars(SHORT)),
-    "Temporal": (Temporal, vars(Temporal())),
     "FrameSolver": (FrameSolver, {"body": BODY} | HOW),
     "FrameSolver.fit": (FrameSolver(BODY, **HOW).fit, {"measurements": SEEN, "init": REST} | HOW),
     "fit_tree": (solver.fit_tree, {"tree": TREE, "measurements": SEEN, "init": REST} | HOW),
@@ -215,14 +213,6 @@ CALLS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     "fit_motion, stands": (
         lambda **a: _moved(stands=StandingPoints(**a)),
         {"indices": [0], "probability": [[1.0], [1.0]]},
-    ),
-    "with_previous": (
-        solver.with_previous,
-        {"measurements": SEEN, "previous": REST, "temporal": Temporal()},
-    ),
-    "with_previous, state": (
-        lambda **a: solver.with_previous(SEEN, State(**a), Temporal()),
-        STATE,
     ),
     "carry": (solver.carry, {"priors": PRIORS, "fitted": FITTED, "shape_weight": 100.0}),
     "make_tree": (solver.make_tree, {"body": BODY, "focal": True}),

@@ -25,7 +25,6 @@ from scope.solver import (
     ShapeError,
     Stage,
     State,
-    Temporal,
     UnitsWarning,
     Weights,
     fit,
@@ -36,7 +35,6 @@ from scope.solver import (
     load_joint_prior,
     make_tree,
     rotations,
-    with_previous,
 )
 
 from .small_problem import BODY, KEYPOINTS, POINTS, SEEN, K, M, P
@@ -238,14 +236,6 @@ SETTINGS_REFUSED = {
         known(joint_mean=np.tile(2.0 * np.eye(3), (K, 1, 1))),
         "Means of the joint prior must be rotation",
     ),
-    "Temporal.joints": (
-        lambda: Temporal(joints=-1.0),
-        "Temporal.joints must be finite and not negative, but is -1",
-    ),
-    "previous": (
-        lambda: with_previous(SEEN, state(Omega=np.zeros((K, 3, 3))), Temporal()),
-        "Omega of the previous state must be rotation matrices",
-    ),
     "weight": (
         lambda: Weights(keypoints3d=-1.0),
         "Weights.keypoints3d must be finite and not negative, but is -1",
@@ -404,9 +394,6 @@ NOT_REFUSED = {
     "no robust kernel": lambda: fit(BODY, SEEN, options=replace(SHORT, robust_keypoints3d=INF)),
     "no iterations": lambda: fit(
         BODY, SEEN, options=Options(stages=[Stage(max_iterations=0, tolerance=0.0)])
-    ),
-    "no pull": lambda: fit_clip(
-        BODY, [SEEN, SEEN], options=SHORT, temporal=Temporal(0.0, 0.0, 0.0)
     ),
 }
 

@@ -10,20 +10,17 @@ from scope.solver import (
     Keypoints3D,
     Measurements,
     Options,
-    PosePriors,
     Priors,
     ShapeError,
     Stage,
     State,
     Status,
-    Temporal,
     Weights,
     carry,
     fit,
     fit_clip,
     load_body,
     rotations,
-    with_previous,
 )
 
 from .. import person
@@ -142,25 +139,6 @@ def test_frames_share_the_shape_and_those_left_out_are_fitted_to_it():
     assert some.focal_scale == pytest.approx(every.focal_scale, abs=0.01)
 
 
-def test_temporal_terms_pull_towards_the_last_frame():
-    body, _, measurements, _ = clip(8, noise=4.0, scale=1.0)
-    free = fit_clip(body, measurements)
-    held = fit_clip(body, measurements, temporal=Temporal(1e6, 1e6, 1000.0))
-
-    def jitter(found):
-        return np.mean(
-            [
-                np.sum((a.t_camera_part - b.t_camera_part) ** 2)
-                for a, b in zip(found.frames, found.frames[1:], strict=False)
-            ]
-        )
-
-    assert jitter(held) < 0.8 * jitter(free)
-    m = with_previous(measurements[0], free.frames[0].state, Temporal())
-    assert len(m.pose_priors.parts) == 1
-    assert len(m.tables["joint_prior"][0]) == K
-
-
 def test_a_clip_without_measurements_ends_well():
     body, *_ = clip(9, frames=1)
     empty = fit_clip(body, [Measurements(), Measurements()], focal=True)
@@ -185,11 +163,11 @@ def from_behind():
     return body, t, Measurements(person.INTRINSICS, image, space)
 
 
-@pytest.mark.parametrize(("unseen", "temporal"), [(1, None), (3, None), (3, Temporal())])
-def test_whoever_appears_later_is_fitted_as_from_the_first_frame(unseen, temporal):
+@pytest.mark.parametrize("unseen", [1, 3])
+def test_whoever_appears_later_is_fitted_as_from_the_first_frame(unseen):
     body, joints, seen = from_behind()
-    found = fit_clip(body, [*[Measurements()] * unseen, seen, seen, seen], temporal=temporal)
-    before = found.frames[: 1 if temporal else unseen]
+    found = fit_clip(body, [*[Measurements()] * unseen, seen, seen, seen])
+    before = found.frames[:unseen]
     after = found.frames[unseen:]
     for f in [*before, *after]:  # those before hold the pose in which the person appears
         assert np.linalg.norm(f.t_camera_part - joints, axis=1).mean() < 0.02
@@ -242,20 +220,3 @@ def test_frames_beyond_those_that_decide_are_weighted_as_they_are(sigma_px):
     assert found.focal_scale > 1.5
     first, left_out, _ = found.frames
     np.testing.assert_allclose(left_out.t_camera_part, first.t_camera_part, atol=1e-5)
-
-
-def test_the_pull_stands_beside_pose_priors_of_named_parts():
-    body = load_body("scope")
-    state = person.pose(body)
-    R, t = person.place(body, state)
-    own = PosePriors(["pelvis", "head"], R[[0, 15]], t[[0, 15]], [1.0, 1.0], [1.0, 1.0])
-    pulled = with_previous(Measurements(pose_priors=own), state, Temporal()).pose_priors
-    assert list(pulled.parts) == ["pelvis", "head", 0]
-    numbers = [body.joint_names.index(name) for name in own.parts]
-    assert numbers == [0, 15]
-    by_number = replace(own, parts=numbers)
-    a, b = (
-        fit(body, with_previous(Measurements(pose_priors=priors), state, Temporal()))
-        for priors in (own, by_number)
-    )
-    np.testing.assert_array_equal(a.t_camera_part, b.t_camera_part)

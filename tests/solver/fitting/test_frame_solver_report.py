@@ -11,7 +11,6 @@ from scope.solver import (
     Options,
     Stage,
     Status,
-    Temporal,
     Weights,
     fit,
     fit_clip,
@@ -50,7 +49,7 @@ def test_a_share_is_the_residuals_own_cost():
 def test_a_clips_shares_count_the_shape_once(focal):
     state = standing(1)
     frames = [seen(state, 0.02, seed) for seed in range(4)]
-    found = fit_clip(BODY, frames, options=REPORT, temporal=Temporal(), focal=focal)
+    found = fit_clip(BODY, frames, options=REPORT, focal=focal)
     assert sum(found.cost_by_term.values()) == pytest.approx(found.cost, rel=1e-9)
     beta = found.beta
     assert found.cost_by_term["shape_prior"] == pytest.approx(
