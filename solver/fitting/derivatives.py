@@ -31,13 +31,12 @@ from ..options import Options, Priors, default_priors
 from ..part import Array
 from ..points import numbered
 from ..residuals.registry import NAMES, SHAPE_PRIOR, column_of, registered
-from ..rotations import hat
 from ..state import State
-from ..tree import BodyArrays, Tree
+from ..tree import BodyArrays
 from ..validation import check_finite, check_list, check_type
 from .normal_equations import (
     gradient,
-    motion_of_parts,
+    motion_of_joints,
     moved,
     preconditioner,
     problem_of,
@@ -113,7 +112,7 @@ def solution_derivatives(
     curvatures = np.linalg.eigvalsh(H)
     if not curvatures[0] > _LEAST_CURVATURE * curvatures[-1]:
         raise InvalidValueError(_NO_MINIMUM)
-    motion = _motion_of_joints(problem.tree, state)
+    motion = motion_of_joints(problem.tree, state.pose(problem.tree))
     unknowns = {}
     for name in wrt:
         mixed = problem.mixed(name)
@@ -144,7 +143,7 @@ def solution_gradient(
     """
     check_list(wrt, "wrt", "gradient")
     problem = _Problem(body, measurements, state, priors, options)
-    motion = _motion_of_joints(problem.tree, state)
+    motion = motion_of_joints(problem.tree, state.pose(problem.tree))
     if np.ndim(loss) == 1:
         by_unknowns = as_array(loss, motion.shape[2:], "loss")
     else:
@@ -280,15 +279,3 @@ class _Problem:
             warnings.simplefilter("ignore")  # what is unlikely was told of the measurements
             terms = make_terms(self.tree, measurements, self.priors)
         return gradient(self.tree, terms, self.stage, self.state)
-
-
-def _motion_of_joints(tree: Tree, state: State) -> Array:
-    """Return the derivatives (K+1, 3, n) of the joints' positions by the unknowns: a joint moves
-    with the twist (w, v) of its part about the pelvis, v + w x (t_i - t_0), and with the shape by
-    D_i.
-    """
-    pose = state.pose(tree)
-    X = motion_of_parts(tree, pose)
-    motion: Array = X[:, 3:] - hat(pose.t - pose.t[0]) @ X[:, :3]
-    motion[:, :, X.shape[2] - tree.shape :] += pose.D[:, :, : tree.shape]
-    return motion

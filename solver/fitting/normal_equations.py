@@ -230,6 +230,17 @@ def motion_of_parts(tree: Tree, pose: Pose) -> Array:
     return X
 
 
+def motion_of_joints(tree: Tree, pose: Pose) -> Array:
+    """Return the derivatives (K+1, 3, n) of the joints' positions by the unknowns: a joint moves
+    with the twist (w, v) of its part about the pelvis, v + w x (t_i - t_0), and with the shape by
+    D_i.
+    """
+    X = motion_of_parts(tree, pose)
+    motion: Array = X[:, 3:] - hat(pose.t - pose.t[0]) @ X[:, :3]
+    motion[:, :, X.shape[2] - tree.shape :] += pose.D[:, :, : tree.shape]
+    return motion
+
+
 def moved(tree: Tree, state: State, d: Array) -> State:
     """Return the state after a step d (n,) of the unknowns."""
     R_parent = state.pose(tree).R[tree.parents[1:]]
