@@ -135,8 +135,7 @@ def some_of(frames: Sequence[Any]) -> Array:
 def warn_of_wrong_points(tree: Tree, measurements: Measurements, found: Fit) -> bool:
     """Warn of 3D keypoints most of which the fitted body is far away from; return whether it is."""
     seen = measurements.keypoints3d
-    is_done = found.status is Status.CONVERGED or found.iterations >= _MANY_ITERATIONS
-    if seen is None or not is_done:
+    if seen is None or not _is_done(found):
         return False
     points, fitted = _seen_and_fitted(tree, seen, seen.points, found)
     if len(points) < _FEWEST_POINTS:
@@ -163,7 +162,7 @@ def warn_of_wrong_pixels(tree: Tree, measurements: Measurements, found: Fit) -> 
     """Warn of 2D keypoints most of which the fitted body is far away from; return whether it is."""
     seen = measurements.keypoints2d
     intrinsics = measurements.intrinsics
-    if seen is None or intrinsics is None or found.status is not Status.CONVERGED:
+    if seen is None or intrinsics is None or not _is_done(found):
         return False
     K = as_array(intrinsics, (3, 3), "Intrinsics")
     pixels, fitted = _seen_and_fitted(tree, seen, seen.pixels, found)
@@ -186,6 +185,10 @@ def warn_of_wrong_pixels(tree: Tree, measurements: Measurements, found: Fit) -> 
             stacklevel=3,
         )
     return is_far
+
+
+def _is_done(found: Fit) -> bool:
+    return found.status is Status.CONVERGED or found.iterations >= _MANY_ITERATIONS
 
 
 def _seen_and_fitted(
