@@ -20,7 +20,8 @@ from numpy.typing import ArrayLike
 
 from .arrays import as_arrays
 from .errors import UnitsWarning
-from .kernel import expanded_kernel, kernel
+from .kernel import kernel
+from .matrices import MINUS_EYE, add9, determinant, entries, product, transposed
 from .part import Array
 
 # above cos(angle) = -1 + this, the antisymmetric part of R still fixes the axis accurately
@@ -124,24 +125,6 @@ def left_jacobian_inverse3(x: float, y: float, z: float) -> tuple[float, ...]:
         k * x * y - hz, 1.0 - k * (x * x + z * z), k * y * z + hx,
         k * x * z + hy, k * y * z - hx, 1.0 - k * (x * x + y * y),
     )  # fmt: skip
-
-
-@expanded_kernel
-def entries(R):  # type: ignore[no-untyped-def]
-    """Return the nine entries of R (3, 3), row by row."""
-    return (
-        R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2],
-    )  # fmt: skip
-
-
-@expanded_kernel
-def turn_back(R, x, y, z):  # type: ignore[no-untyped-def]
-    """Return the three numbers Rᵀ (x, y, z)."""
-    return (
-        R[0, 0] * x + R[1, 0] * y + R[2, 0] * z,
-        R[0, 1] * x + R[1, 1] * y + R[2, 1] * z,
-        R[0, 2] * x + R[1, 2] * y + R[2, 2] * z,
-    )
 
 
 def hat(phi: ArrayLike) -> Array:
@@ -282,26 +265,17 @@ def orthonormalize(R) -> bool:  # type: ignore[no-untyped-def]
     one that is not.
     """
     for k in range(R.shape[0]):
-        M = R[k]
-        n00 = M[0, 0] * M[0, 0] + M[1, 0] * M[1, 0] + M[2, 0] * M[2, 0] - 1.0
-        n11 = M[0, 1] * M[0, 1] + M[1, 1] * M[1, 1] + M[2, 1] * M[2, 1] - 1.0
-        n22 = M[0, 2] * M[0, 2] + M[1, 2] * M[1, 2] + M[2, 2] * M[2, 2] - 1.0
-        n01 = M[0, 0] * M[0, 1] + M[1, 0] * M[1, 1] + M[2, 0] * M[2, 1]
-        n02 = M[0, 0] * M[0, 2] + M[1, 0] * M[1, 2] + M[2, 0] * M[2, 2]
-        n12 = M[0, 1] * M[0, 2] + M[1, 1] * M[1, 2] + M[2, 1] * M[2, 2]
-        worst = max(max(max(abs(n00), abs(n11)), abs(n22)), max(max(abs(n01), abs(n02)), abs(n12)))
-        det = M[0, 0] * (M[1, 1] * M[2, 2] - M[1, 2] * M[2, 1])
-        det += M[0, 1] * (M[1, 2] * M[2, 0] - M[1, 0] * M[2, 2])
-        det += M[0, 2] * (M[1, 0] * M[2, 1] - M[1, 1] * M[2, 0])
-        if not (worst < 1e-7 and det > 0.0):
+        M = entries(R[k])
+        off = add9(product(transposed(M), M), MINUS_EYE)
+        worst = 0.0
+        for e in off:
+            worst = max(worst, abs(e))
+        if not (worst < 1e-7 and determinant(M) > 0.0):
             return False
+        more = product(M, off)
         for r in range(3):
-            a = 0.5 * M[r, 0]
-            b = 0.5 * M[r, 1]
-            c = 0.5 * M[r, 2]
-            M[r, 0] -= a * n00 + b * n01 + c * n02
-            M[r, 1] -= a * n01 + b * n11 + c * n12
-            M[r, 2] -= a * n02 + b * n12 + c * n22
+            for c in range(3):
+                R[k, r, c] -= 0.5 * more[3 * r + c]
     return True
 
 

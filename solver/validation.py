@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from .arrays import as_array, as_integers, described, has_axis
 from .errors import InvalidValueError, ScopeWarning, ShapeError, UnitsWarning
 from .kernel import kernel
+from .matrices import MINUS_EYE, add9, determinant, entries, product, transposed
 from .part import Array
 
 # of the entries of R Rᵀ - I: rotations rounded to two decimals pass, scaled ones do not
@@ -472,22 +473,11 @@ def _first_not_rotation(R: Array, weights: Array, every: bool) -> int:
     for k in range(R.shape[0]):
         if not every and not weights[k] > 0.0:
             continue
-        M = R[k]
+        M = entries(R[k])
         off = 0.0
-        for r in range(3):
-            for c in range(3):
-                e = (
-                    M[r, 0] * M[c, 0]
-                    + M[r, 1] * M[c, 1]
-                    + M[r, 2] * M[c, 2]
-                    - (1.0 if r == c else 0.0)
-                )
-                off = max(off, abs(e))
-        det = (
-            M[0, 0] * (M[1, 1] * M[2, 2] - M[1, 2] * M[2, 1])
-            - M[0, 1] * (M[1, 0] * M[2, 2] - M[1, 2] * M[2, 0])
-            + M[0, 2] * (M[1, 0] * M[2, 1] - M[1, 1] * M[2, 0])
-        )
+        for e in add9(product(M, transposed(M)), MINUS_EYE):
+            off = max(off, abs(e))
+        det = determinant(M)
         if 0.0 * det != 0.0:
             if every:
                 return k

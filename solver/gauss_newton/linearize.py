@@ -18,6 +18,7 @@ rows; the loops over the shape's columns are in plain_rows.py.
 import numpy as np
 
 from ..kernel import expanded_kernel, kernel
+from ..matrices import entries
 from ..part import GRADIENT, SHAPE, Array, Blocks, Pose
 from ..residuals import keypoint2d, keypoint3d, orientation_field, shape_prior
 from ..residuals.external import accumulate_external
@@ -28,7 +29,6 @@ from ..residuals.registry import (
     SHAPE_PRIOR,
     accumulate_tables,
 )
-from ..rotations import entries
 from ..tree import Tree
 from .rows import add_origin, add_point, place_origin
 from .terms import HAS_2D, HAS_3D, HAS_DIRECTION, HAS_SHAPE, Terms

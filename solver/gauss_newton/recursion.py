@@ -21,8 +21,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..kernel import expanded_kernel, kernel
+from ..matrices import entries, product, rotated, transposed, write_entries
 from ..part import GRADIENT, SHAPE, Array, Blocks, Pose
-from ..rotations import exp3, turn_back
+from ..rotations import exp3
 from ..tree import Tree
 from .linearize import make_scratch
 from .rows import add_to_parent, scale_rows, subtract_eliminated, take_moment
@@ -308,17 +309,11 @@ def move(tree, pose, x, u, dg, trial):  # type: ignore[no-untyped-def]
             old = pose.R[0]
             new = trial.R[0]
         else:
-            R = pose.R[tree.parents[i]]
-            E = exp3(*turn_back(R, u[i, 0], u[i, 1], u[i, 2]))
+            R_parent_camera = transposed(entries(pose.R[tree.parents[i]]))
+            E = exp3(*rotated(R_parent_camera, u[i]))
             old = pose.Omega[i]
             new = trial.Omega[i]
-        for k in range(3):
-            a = old[0, k]
-            b = old[1, k]
-            d = old[2, k]
-            new[0, k] = E[0] * a + E[1] * b + E[2] * d
-            new[1, k] = E[3] * a + E[4] * b + E[5] * d
-            new[2, k] = E[6] * a + E[7] * b + E[8] * d
+        write_entries(product(E, entries(old)), new)
     for r in range(3):
         trial.t[0, r] = pose.t[0, r] + x[3 + r]
     for a in range(tree.shape):

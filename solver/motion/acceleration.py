@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..kernel import kernel
+from ..matrices import entries, product, transposed, write_entries
 from ..part import Array
 from ..residuals.accumulation import geman_mcclure, relative_log
 from ..rotations import left_jacobian_inverse3
@@ -27,26 +28,12 @@ from ..tree import Tree
 @kernel
 def _velocity(A, B, h, phi, J) -> None:  # type: ignore[no-untyped-def]
     """Write phi = log(AᵀB) / h (3,) and J = J^-1(log(AᵀB)) Aᵀ / h (3, 3)."""
-    x, y, z = relative_log(A.reshape(9), B)
-    Ji = left_jacobian_inverse3(x, y, z)
-    phi[0] = x / h
-    phi[1] = y / h
-    phi[2] = z / h
+    difference = relative_log(A.reshape(9), B)
+    write_entries(product(left_jacobian_inverse3(*difference), transposed(entries(A))), J)
     for r in range(3):
-        J[0, r] = (Ji[0] * A[r, 0] + Ji[1] * A[r, 1] + Ji[2] * A[r, 2]) / h
-        J[1, r] = (Ji[3] * A[r, 0] + Ji[4] * A[r, 1] + Ji[5] * A[r, 2]) / h
-        J[2, r] = (Ji[6] * A[r, 0] + Ji[7] * A[r, 1] + Ji[8] * A[r, 2]) / h
-
-
-@kernel
-def _turn(J, R) -> None:  # type: ignore[no-untyped-def]
-    """J <- J Rᵀ, in place, both (3, 3)."""
-    for r in range(3):
-        a = J[r, 0]
-        b = J[r, 1]
-        c = J[r, 2]
+        phi[r] = difference[r] / h
         for s in range(3):
-            J[r, s] = a * R[s, 0] + b * R[s, 1] + c * R[s, 2]
+            J[r, s] /= h
 
 
 @kernel
@@ -143,7 +130,8 @@ def accumulate(  # type: ignore[no-untyped-def]
                     J[2, r, s] = after[k, r, s] / mean
             if 0 < k < parts:
                 for p in range(3):
-                    _turn(J[p], poses.R[f - 2 + p, tree.parents[k]])
+                    R_parent_camera = transposed(entries(poses.R[f - 2 + p, tree.parents[k]]))
+                    write_entries(product(entries(J[p]), R_parent_camera), J[p])
             rho, w = geman_mcclure(s2, table[k, 1])
             cost += 0.5 * weight * rho
             at = 3 if k == parts else (0 if k == 0 else 3 + 3 * k)

@@ -10,10 +10,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numba.extending import register_jitable
 
-from ..gauss_newton.curvature import Curvature, allowed_share, set_current, turned, update, upper
+from ..gauss_newton.curvature import Curvature, allowed_part, set_current, update
 from ..gauss_newton.optimizer import MIN_DAMPING, SeveralFrames
 from ..gauss_newton.recursion import move
 from ..kernel import kernel
+from ..matrices import entries, turned
 from ..part import Array, Blocks, Pose
 from .band import eliminate_clip, make_factor, solve_clip
 from .problem import ClipProblem
@@ -64,19 +65,14 @@ def _apply(tree, poses, curvature, share, added, system) -> None:  # type: ignor
     for f in range(added.shape[0]):
         D = system.D[f]
         for i in range(1, added.shape[1]):
-            S = upper(curvature.S[f, i])
-            t = share * allowed_share(curvature.H[f, i], curvature.S[f, i]) if share > 0.0 else 0.0
-            if t > 0.0:  # False if S has overflowed
-                S = turned(poses.R[f, tree.parents[i]], S, True)
-            else:
-                t = 0.0
-                S = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            part = allowed_part(curvature.H[f, i], curvature.S[f, i], share)
+            S = turned(entries(poses.R[f, tree.parents[i]]), part)
             at = 3 + 3 * i
             k = 0
             for r in range(3):
                 for c in range(r, 3):
-                    D[at + r, at + c] += t * S[k] - added[f, i, k]
-                    added[f, i, k] = t * S[k]
+                    D[at + r, at + c] += S[k] - added[f, i, k]
+                    added[f, i, k] = S[k]
                     k += 1
 
 
@@ -107,7 +103,7 @@ class Optimizer(SeveralFrames):
         self.factor = make_factor(self.system)
         self.costs = dict[str, float]()
         shape = problem.frames, len(problem.tree.parents)
-        S, H = np.zeros((2, *shape, 3, 3))
+        S, H = np.zeros((2, *shape, 6))
         self._curvature = Curvature(S, H, np.zeros((*shape, 3)))
         self._added = np.zeros((*shape, 6))
 

@@ -10,8 +10,8 @@ docs/solver_mathematics.md, "A whole clip", has the objective.
 """
 
 from ..kernel import kernel
-from ..residuals.accumulation import lever
-from .system import GLOBALS, pose_of, write_turn
+from ..residuals.accumulation import lever, shape_derivative
+from .system import GLOBALS, pose_of
 
 
 @kernel
@@ -30,20 +30,20 @@ def _jacobian(tree, poses, f, j, count, p, J) -> None:  # type: ignore[no-untype
     while k >= 0:
         if k == 0:
             at = 0
-        e = (p[0] - pose.t[k, 0], p[1] - pose.t[k, 1], p[2] - pose.t[k, 2])
-        write_turn(*e, J, at)
+        for r in range(3):  # the derivative of u x (p - t_k) by u
+            J[r, at + r] = 0.0
+            e = p[r] - pose.t[k, r]
+            J[(r + 1) % 3, at + (r + 2) % 3] = e
+            J[(r + 2) % 3, at + (r + 1) % 3] = -e
         at -= 3
         k = tree.parents[k]
     for r in range(3):
         for s in range(3):
             J[r, 3 + s] = 1.0 if r == s else 0.0
-    R = pose.R[i]
     for a in range(tree.shape):
+        B = shape_derivative(tree, pose, j, i, a)
         for r in range(3):
-            turned = (
-                R[r, 0] * tree.V[j, 0, a] + R[r, 1] * tree.V[j, 1, a] + R[r, 2] * tree.V[j, 2, a]
-            )
-            J[r, count + a] = turned + pose.D[i, r, a]
+            J[r, count + a] = B[r]
 
 
 @kernel

@@ -21,6 +21,7 @@ from numba.extending import register_jitable
 
 from ..gauss_newton.recursion import copy_rows
 from ..kernel import kernel
+from ..matrices import entries, symmetric, transposed, turned, upper
 from ..part import GRADIENT, SHAPE, Array, Blocks, Pose
 from ..tree import Tree, padded
 
@@ -102,20 +103,6 @@ def pose_of(poses: Pose, f: int) -> Pose:
 
 
 @kernel
-def write_turn(ex, ey, ez, J, at) -> None:  # type: ignore[no-untyped-def]
-    """Write the derivative of u x e by u to the columns of J (3, .) from `at` on."""
-    J[0, at] = 0.0
-    J[0, at + 1] = ez
-    J[0, at + 2] = -ey
-    J[1, at] = -ez
-    J[1, at + 1] = 0.0
-    J[1, at + 2] = ex
-    J[2, at] = ey
-    J[2, at + 1] = -ex
-    J[2, at + 2] = 0.0
-
-
-@kernel
 def add_turned(turn, source: Blocks, sums: Blocks) -> None:  # type: ignore[no-untyped-def]
     """Add blocks of a camera whose axes are turn (3, 3) times those of `sums`: x' = (R w, R nu), u'
     = R u.
@@ -140,16 +127,10 @@ def add_turned(turn, source: Blocks, sums: Blocks) -> None:  # type: ignore[no-u
                     z = a * rows[0, first + 2] + b * rows[1, first + 2] + c * rows[2, first + 2]
                     for s in range(3):
                         into[r, first + s] += x * turn[0, s] + y * turn[1, s] + z * turn[2, s]
-        H = source.H_uu[i]
+        H = symmetric(turned(transposed(entries(turn)), upper(entries(source.H_uu[i]))))
         for r in range(3):
-            a = turn[0, r]
-            b = turn[1, r]
-            c = turn[2, r]
-            x = a * H[0, 0] + b * H[1, 0] + c * H[2, 0]
-            y = a * H[0, 1] + b * H[1, 1] + c * H[2, 1]
-            z = a * H[0, 2] + b * H[1, 2] + c * H[2, 2]
             for s in range(3):
-                sums.H_uu[i, r, s] += x * turn[0, s] + y * turn[1, s] + z * turn[2, s]
+                sums.H_uu[i, r, s] += H[3 * r + s]
     for a in range(W):
         sums.c[a] += source.c[a]
         for b in range(W):

@@ -21,6 +21,7 @@ from ..arrays import as_array, described
 from ..errors import InvalidValueError, ShapeError
 from ..gauss_newton.terms import Layout, PackedPriors, Terms, fill_terms, usable
 from ..kernel import kernel
+from ..matrices import add3, entries, product, rotated, write_entries
 from ..measurements import Measurements
 from ..part import Array
 from ..points import frames_of, numbered
@@ -289,15 +290,9 @@ def _placed(view: View) -> tuple[Array, Array, bool]:
     """Return R_camera_world, made orthonormal, t_camera_world, and whether the camera's axes are
     the world's.
     """
-    R = np.asarray(view.R_camera_world, dtype=float)
+    R = nearest_rotation(view.R_camera_world)
     t = np.asarray(view.t_camera_world, dtype=float)
-    if np.array_equal(R, _EYE) and not t.any():
-        return _EYE, _NULL, True
-    return nearest_rotation(R), t, False
-
-
-_EYE = np.eye(3)
-_NULL = np.zeros(3)
+    return R, t, np.array_equal(R, np.eye(3)) and not t.any()
 
 
 def _joined(views: Sequence[External]) -> tuple[Array, External]:
@@ -322,18 +317,13 @@ def place_in_camera(R, t, pose, seen) -> None:  # type: ignore[no-untyped-def]
 
     R (3, 3), t (3,): the world in the camera's axes.
     """
+    turn = entries(R)
+    write_entries(product(turn, entries(pose.R[0])), seen.R[0])
+    root = add3(rotated(turn, pose.t[0]), t)
     for r in range(3):
-        for c in range(3):
-            seen.R[0, r, c] = (
-                R[r, 0] * pose.R[0, 0, c] + R[r, 1] * pose.R[0, 1, c] + R[r, 2] * pose.R[0, 2, c]
-            )
-        seen.t[0, r] = (
-            R[r, 0] * pose.t[0, 0] + R[r, 1] * pose.t[0, 1] + R[r, 2] * pose.t[0, 2] + t[r]
-        )
+        seen.t[0, r] = root[r]
     for i in range(1, pose.Omega.shape[0]):
-        for r in range(3):
-            for c in range(3):
-                seen.Omega[i, r, c] = pose.Omega[i, r, c]
+        write_entries(entries(pose.Omega[i]), seen.Omega[i])
     for a in range(pose.beta.shape[0]):
         seen.beta[a] = pose.beta[a]
     seen.log_focal[0] = pose.log_focal[0]

@@ -19,6 +19,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..kernel import expanded_kernel, kernel
+from ..matrices import (
+    add3,
+    add_cross,
+    cross_both,
+    cross_symmetric,
+    entries,
+    product,
+    rotated,
+    symmetric,
+    transposed,
+    turned,
+)
 from ..part import GRADIENT, SHAPE, Array
 from ..rotations import log3
 
@@ -42,17 +54,7 @@ def geman_mcclure(s: float, inv_sigma: float) -> tuple[float, float]:
 @kernel
 def relative_log(h, R):  # type: ignore[no-untyped-def]
     """Return log(H^T R), three numbers; h begins with H (9) by rows, R (3, 3)."""
-    return log3(
-        h[0] * R[0, 0] + h[3] * R[1, 0] + h[6] * R[2, 0],
-        h[0] * R[0, 1] + h[3] * R[1, 1] + h[6] * R[2, 1],
-        h[0] * R[0, 2] + h[3] * R[1, 2] + h[6] * R[2, 2],
-        h[1] * R[0, 0] + h[4] * R[1, 0] + h[7] * R[2, 0],
-        h[1] * R[0, 1] + h[4] * R[1, 1] + h[7] * R[2, 1],
-        h[1] * R[0, 2] + h[4] * R[1, 2] + h[7] * R[2, 2],
-        h[2] * R[0, 0] + h[5] * R[1, 0] + h[8] * R[2, 0],
-        h[2] * R[0, 1] + h[5] * R[1, 1] + h[8] * R[2, 1],
-        h[2] * R[0, 2] + h[5] * R[1, 2] + h[8] * R[2, 2],
-    )
+    return log3(*product(transposed(h), entries(R)))
 
 
 @kernel
@@ -62,23 +64,13 @@ def add_to_joint(  # type: ignore[no-untyped-def]
     """Add a Hessian and a gradient in the parent's axes to joint i: H_uu += R_par H R_parᵀ, g_u +=
     R_par g.
     """
-    R = pose.R[tree.parents[i]]
+    R = entries(pose.R[tree.parents[i]])
+    H = symmetric(turned(R, (h00, h01, h02, h11, h12, h22)))
+    g = rotated(R, (g0, g1, g2))
     for r in range(3):
-        x = R[r, 0]
-        y = R[r, 1]
-        z = R[r, 2]
-        a = x * h00 + y * h01 + z * h02
-        b = x * h01 + y * h11 + z * h12
-        c = x * h02 + y * h12 + z * h22
         for s in range(3):
-            blocks.H_uu[i, r, s] += a * R[s, 0] + b * R[s, 1] + c * R[s, 2]
-        blocks.H_u[i, r, GRADIENT] += x * g0 + y * g1 + z * g2
-
-
-@expanded_kernel
-def outer(w, a, b, c):  # type: ignore[no-untyped-def]
-    """Return the upper triangle of w (a, b, c)ᵀ(a, b, c) by rows, six numbers."""
-    return w * a * a, w * a * b, w * a * c, w * b * b, w * b * c, w * c * c
+            blocks.H_uu[i, r, s] += H[3 * r + s]
+        blocks.H_u[i, r, GRADIENT] += g[r]
 
 
 @kernel
@@ -92,27 +84,29 @@ def lever(tree, pose, k):  # type: ignore[no-untyped-def]
         x += tree.V[k, 0, a] * b
         y += tree.V[k, 1, a] * b
         z += tree.V[k, 2, a] * b
-    R = pose.R[tree.point_part[k]]
-    return (
-        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
-        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
-        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
-    )
+    return rotated(entries(pose.R[tree.point_part[k]]), (x, y, z))
 
 
 @kernel
-def _shape_derivative(tree, pose, k, i, a):  # type: ignore[no-untyped-def]
+def shape_derivative(tree, pose, k, i, a):  # type: ignore[no-untyped-def]
     """Return column a of B = R_i V_k + D_i."""
-    R = pose.R[i]
-    D = pose.D[i]
-    x = tree.V[k, 0, a]
-    y = tree.V[k, 1, a]
-    z = tree.V[k, 2, a]
-    return (
-        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + D[0, a],
-        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + D[1, a],
-        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + D[2, a],
-    )
+    V = tree.V[k, :, a]
+    return add3(rotated(entries(pose.R[i]), V), pose.D[i, :, a])
+
+
+@expanded_kernel
+def add_block(A, y, z, w, m, f):  # type: ignore[no-untyped-def]
+    """Add M = [[Y, Z], [Zᵀ, W]], the moment m and the force f to a part's block A (6, 8+W)."""
+    Y = symmetric(y)
+    W = symmetric(w)
+    for r in range(3):
+        for s in range(3):
+            A[r, s] += Y[3 * r + s]
+            A[r, 3 + s] += z[3 * r + s]
+            A[3 + s, r] += z[3 * r + s]
+            A[3 + r, 3 + s] += W[3 * r + s]
+        A[r, GRADIENT] += m[r]
+        A[3 + r, GRADIENT] += f[r]
 
 
 @kernel
@@ -124,55 +118,21 @@ def add_to_point(  # type: ignore[no-untyped-def]
     """
     i = tree.point_part[k]
     A = blocks.A[i]
-    C = blocks.C
-    c = blocks.c
     t = pose.t[i]
     o = pose.t[0]
-    x = lx + t[0] - o[0]
-    y = ly + t[1] - o[1]
-    z = lz + t[2] - o[2]
-    W = ((w00, w01, w02), (w01, w11, w12), (w02, w12, w22))
-    for s in range(3):
-        # column s of W, of [e]x W, and of [e]x W [e]xT = -[e]x W [e]x
-        A[3, 3 + s] += W[0][s]
-        A[4, 3 + s] += W[1][s]
-        A[5, 3 + s] += W[2][s]
-    b00 = y * w02 - z * w01
-    b01 = y * w12 - z * w11
-    b02 = y * w22 - z * w12
-    b10 = z * w00 - x * w02
-    b11 = z * w01 - x * w12
-    b12 = z * w02 - x * w22
-    b20 = x * w01 - y * w00
-    b21 = x * w11 - y * w01
-    b22 = x * w12 - y * w02
-    corner = ((b00, b01, b02), (b10, b11, b12), (b20, b21, b22))
-    for r in range(3):
-        for s in range(3):
-            A[r, 3 + s] += corner[r][s]
-            A[3 + s, r] += corner[r][s]
-        b0, b1, b2 = corner[r]
-        A[r, 0] += y * b2 - z * b1
-        A[r, 1] += z * b0 - x * b2
-        A[r, 2] += x * b1 - y * b0
-    A[0, GRADIENT] += y * f2 - z * f1
-    A[1, GRADIENT] += z * f0 - x * f2
-    A[2, GRADIENT] += x * f1 - y * f0
-    A[3, GRADIENT] += f0
-    A[4, GRADIENT] += f1
-    A[5, GRADIENT] += f2
+    e = (lx + t[0] - o[0], ly + t[1] - o[1], lz + t[2] - o[2])
+    w = (w00, w01, w02, w11, w12, w22)
+    f = (f0, f1, f2)
+    b = cross_symmetric(e, w)
+    add_block(A, cross_both(e, b), b, w, add_cross((0.0, 0.0, 0.0), e, f), f)
     for a in range(tree.shape):
-        B0, B1, B2 = _shape_derivative(tree, pose, k, i, a)
-        c[a] += B0 * f0 + B1 * f1 + B2 * f2
-        g0 = w00 * B0 + w01 * B1 + w02 * B2
-        g1 = w01 * B0 + w11 * B1 + w12 * B2
-        g2 = w02 * B0 + w12 * B1 + w22 * B2
-        A[0, SHAPE + a] += y * g2 - z * g1
-        A[1, SHAPE + a] += z * g0 - x * g2
-        A[2, SHAPE + a] += x * g1 - y * g0
-        A[3, SHAPE + a] += g0
-        A[4, SHAPE + a] += g1
-        A[5, SHAPE + a] += g2
-        for b in range(a, tree.shape):
-            E0, E1, E2 = _shape_derivative(tree, pose, k, i, b)
-            C[a, b] += g0 * E0 + g1 * E1 + g2 * E2
+        B = shape_derivative(tree, pose, k, i, a)
+        blocks.c[a] += B[0] * f0 + B[1] * f1 + B[2] * f2
+        g = rotated(symmetric(w), B)
+        m = add_cross((0.0, 0.0, 0.0), e, g)
+        for r in range(3):
+            A[r, SHAPE + a] += m[r]
+            A[3 + r, SHAPE + a] += g[r]
+        for d in range(a, tree.shape):
+            E = shape_derivative(tree, pose, k, i, d)
+            blocks.C[a, d] += g[0] * E[0] + g[1] * E[1] + g[2] * E[2]

@@ -13,8 +13,9 @@ are. Source: a one-sided height keeps the form r_i(T_i, beta) of section 3 of th
 import numpy as np
 
 from ..kernel import kernel
+from ..matrices import outer
 from ..part import Array
-from .accumulation import add_to_point, lever, outer, rows_of
+from .accumulation import add_to_point, lever, rows_of
 
 INTS = 1  # point, numbered as in the measurements
 FLOATS = 6  # n (3), a unit vector, d, w_below, w_above

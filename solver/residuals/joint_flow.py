@@ -22,14 +22,13 @@ of the paper, which leaves the kind of flow open; this one is ours. Training: to
 """
 
 import math
-from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
 
 from ..gauss_newton.plain_rows import LANES, STATE
 from ..gauss_newton.rows import in_lanes
 from ..kernel import allocating_kernel, kernel
+from ..matrices import formula, product, rotated, transposed, upper
 from ..part import Array
 from ..rotations import exp, exp3, log, matrix_from_quaternion
 from .accumulation import add_to_joint, relative_log
@@ -59,8 +58,6 @@ NEAREST = 1e-4  # radians to pi
 _MIN_TRACE = 4.0 * math.sin(0.5 * NEAREST) ** 2  # of 1 + tr MᵀOmega = 4 cos^2(angle / 2)
 _FARTHEST = math.sin(0.5 * NEAREST) ** -2.5  # of (1 + w^2) / w^(5/2)
 
-formula: Any = register_jitable  # Python runs such a function as it is; kernels may call it
-
 # A state of the formulas has STATE entries: x (3), dx/de (9) by rows, and |det dx/dmu| without
 # constants. Formulas take it as a tuple, and find their parameter k at q[at + k n]. Their numbers
 # may be numpy arrays, or whatever `in_lanes` passes.
@@ -69,24 +66,14 @@ formula: Any = register_jitable  # Python runs such a function as it is; kernels
 @formula
 def chart(q, at, n, s):  # type: ignore[no-untyped-def]
     """Return the state y from Omega, the first 9 of s, by rows; parameters M."""
-    m00, m01, m02, m10, m11, m12, m20, m21, m22 = _matrix(q, at, n)
-    # L = MᵀOmega
-    l00 = m00 * s[0] + m10 * s[3] + m20 * s[6]
-    l01 = m00 * s[1] + m10 * s[4] + m20 * s[7]
-    l02 = m00 * s[2] + m10 * s[5] + m20 * s[8]
-    l10 = m01 * s[0] + m11 * s[3] + m21 * s[6]
-    l11 = m01 * s[1] + m11 * s[4] + m21 * s[7]
-    l12 = m01 * s[2] + m11 * s[5] + m21 * s[8]
-    l20 = m02 * s[0] + m12 * s[3] + m22 * s[6]
-    l21 = m02 * s[1] + m12 * s[4] + m22 * s[7]
-    l22 = m02 * s[2] + m12 * s[5] + m22 * s[8]
-    four_ww = 1.0 + l00 + l11 + l22
+    L = product(transposed(_matrix(q, at, n)), s)  # MᵀOmega
+    four_ww = 1.0 + L[0] + L[4] + L[8]
     w = 0.5 * np.sqrt(four_ww)
     root = np.sqrt(w)
     k = root / four_ww
-    x = k * (l21 - l12)
-    y = k * (l02 - l20)
-    z = k * (l10 - l01)
+    x = k * (L[7] - L[5])
+    y = k * (L[2] - L[6])
+    z = k * (L[3] - L[1])
     f = 0.5 * root
     quarter = 0.25 / root
     a = quarter * x
@@ -116,23 +103,14 @@ def _matrix(q, at, n):  # type: ignore[no-untyped-def]
 @formula
 def _linear(q, at, n, s):  # type: ignore[no-untyped-def]
     """Return A x + b and A J, with A and b from parameter `at` on, and the rest of the state."""
-    a00, a01, a02, a10, a11, a12, a20, a21, a22 = _matrix(q, at, n)
-    x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det = s
-    return (
-        q[at + 9 * n] + a00 * x + a01 * y + a02 * z,
-        q[at + 10 * n] + a10 * x + a11 * y + a12 * z,
-        q[at + 11 * n] + a20 * x + a21 * y + a22 * z,
-        a00 * j00 + a01 * j10 + a02 * j20,
-        a00 * j01 + a01 * j11 + a02 * j21,
-        a00 * j02 + a01 * j12 + a02 * j22,
-        a10 * j00 + a11 * j10 + a12 * j20,
-        a10 * j01 + a11 * j11 + a12 * j21,
-        a10 * j02 + a11 * j12 + a12 * j22,
-        a20 * j00 + a21 * j10 + a22 * j20,
-        a20 * j01 + a21 * j11 + a22 * j21,
-        a20 * j02 + a21 * j12 + a22 * j22,
-        det,
-    )  # fmt: skip
+    a = _matrix(q, at, n)
+    x, y, z = s[:3]
+    moved = (
+        q[at + 9 * n] + a[0] * x + a[1] * y + a[2] * z,
+        q[at + 10 * n] + a[3] * x + a[4] * y + a[5] * z,
+        q[at + 11 * n] + a[6] * x + a[7] * y + a[8] * z,
+    )
+    return moved + product(a, s[3:12]) + s[12:]
 
 
 @formula
@@ -229,41 +207,18 @@ def layer(q, at, n, s):  # type: ignore[no-untyped-def]
 @formula
 def finish(q, at, n, s):  # type: ignore[no-untyped-def]
     """Return the state z with derivatives in the parent's axes in place of M's."""
-    x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det = _linear(q, at + LAST * n, n, s)
-    m00, m01, m02, m10, m11, m12, m20, m21, m22 = _matrix(q, at, n)
-    # (M row) of each row of derivatives
-    return (
-        x, y, z,
-        m00 * j00 + m01 * j01 + m02 * j02,
-        m10 * j00 + m11 * j01 + m12 * j02,
-        m20 * j00 + m21 * j01 + m22 * j02,
-        m00 * j10 + m01 * j11 + m02 * j12,
-        m10 * j10 + m11 * j11 + m12 * j12,
-        m20 * j10 + m21 * j11 + m22 * j12,
-        m00 * j20 + m01 * j21 + m02 * j22,
-        m10 * j20 + m11 * j21 + m12 * j22,
-        m20 * j20 + m21 * j21 + m22 * j22,
-        det,
-    )  # fmt: skip
+    s = _linear(q, at + LAST * n, n, s)
+    return s[:3] + product(s[3:12], transposed(_matrix(q, at, n))) + s[12:]
 
 
 @formula
 def normal(q, at, n, s):  # type: ignore[no-untyped-def]
     """Return JᵀJ (6, upper), Jᵀz (3), |z|^2, and from entry 10 on what a state has."""
-    x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det = s
-    return (
-        j00 * j00 + j10 * j10 + j20 * j20,
-        j00 * j01 + j10 * j11 + j20 * j21,
-        j00 * j02 + j10 * j12 + j20 * j22,
-        j01 * j01 + j11 * j11 + j21 * j21,
-        j01 * j02 + j11 * j12 + j21 * j22,
-        j02 * j02 + j12 * j12 + j22 * j22,
-        j00 * x + j10 * y + j20 * z,
-        j01 * x + j11 * y + j21 * z,
-        j02 * x + j12 * y + j22 * z,
-        x * x + y * y + z * z,
-        x, y, det,
-    )  # fmt: skip
+    z = s[:3]
+    J = s[3:12]
+    Jt = transposed(J)
+    square = z[0] * z[0] + z[1] * z[1] + z[2] * z[2]
+    return upper(product(Jt, J)) + rotated(Jt, z) + (square,) + s[10:]
 
 
 _chart = in_lanes(chart)
@@ -278,19 +233,18 @@ def _gather(pose, ints, k, state):  # type: ignore[no-untyped-def]
     for lane in range(LANES):
         Om = pose.Omega[ints[k, lane]]
         for r in range(3):
-            state[3 * r * LANES + lane] = Om[r, 0]
-            state[(3 * r + 1) * LANES + lane] = Om[r, 1]
-            state[(3 * r + 2) * LANES + lane] = Om[r, 2]
+            for c in range(3):
+                state[(3 * r + c) * LANES + lane] = Om[r, c]
 
 
 @kernel
-def _keep_off_half_turns(pose, ints, floats, k, state):  # type: ignore[no-untyped-def]
-    """Write the states of the joints of row k that are nearly a half turn from their M at pi -
+def _keep_off_half_turns(pose, ints, floats, row, state):  # type: ignore[no-untyped-def]
+    """Write the states of a row's joints that are nearly a half turn from their M at pi -
     `NEAREST`.
     """
     for lane in range(LANES):
-        M = floats[k, MEAN * LANES + lane : (MEAN + 9) * LANES : LANES]
-        R = pose.Omega[ints[k, lane]]
+        M = floats[row, MEAN * LANES + lane : (MEAN + 9) * LANES : LANES]
+        R = pose.Omega[ints[row, lane]]
         trace = 0.0
         for r in range(3):
             for c in range(3):
@@ -299,12 +253,9 @@ def _keep_off_half_turns(pose, ints, floats, k, state):  # type: ignore[no-untyp
             continue
         x, y, z = relative_log(M, R)
         scale = (math.pi - NEAREST) / math.sqrt(x * x + y * y + z * z)
-        E = exp3(scale * x, scale * y, scale * z)
-        for r in range(3):
-            for c in range(3):
-                state[(3 * r + c) * LANES + lane] = (
-                    M[3 * r] * E[c] + M[3 * r + 1] * E[3 + c] + M[3 * r + 2] * E[6 + c]
-                )
+        found = product(M, exp3(scale * x, scale * y, scale * z))
+        for k in range(9):
+            state[k * LANES + lane] = found[k]
 
 
 @allocating_kernel

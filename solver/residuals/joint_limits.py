@@ -18,9 +18,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..kernel import kernel
+from ..matrices import add3, add6, entries, outer, rotated, transposed, turned
 from ..part import Array
-from ..rotations import entries, left_jacobian_inverse3, log3
-from .accumulation import add_to_joint, outer, rows_of
+from ..rotations import left_jacobian_inverse3, log3
+from .accumulation import add_to_joint, rows_of
 
 INTS = 1  # joint
 FLOATS = 8  # axis (3), lower, upper, swing_limit, w, w_swing
@@ -59,12 +60,10 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
         swung = swing > f[5] and v > 0.0
         if not hinged and not swung:
             continue
-        J = left_jacobian_inverse3(x, y, z)
+        Jt = transposed(left_jacobian_inverse3(x, y, z))
         H = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         g = (0.0, 0.0, 0.0)
-        a0 = f[0] * J[0] + f[1] * J[3] + f[2] * J[6]
-        a1 = f[0] * J[1] + f[1] * J[4] + f[2] * J[7]
-        a2 = f[0] * J[2] + f[1] * J[5] + f[2] * J[8]
+        a0, a1, a2 = rotated(Jt, f)
         if hinged:
             cost += 0.5 * w * r * r
             H = outer(w, a0, a1, a2)
@@ -73,21 +72,13 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
             share = 1.0 - f[5] / swing
             cost += 0.5 * v * share * share * swing * swing
             # JᵀJ = k^2 (J^-Tᵀ(I - a aᵀ)J^-1) + (1 - k^2) b bᵀ with b = J^-T s^
-            b0 = (sx * J[0] + sy * J[3] + sz * J[6]) / swing
-            b1 = (sx * J[1] + sy * J[4] + sz * J[7]) / swing
-            b2 = (sx * J[2] + sy * J[5] + sz * J[8]) / swing
+            b0, b1, b2 = rotated(Jt, (sx / swing, sy / swing, sz / swing))
             p = v * share * share
-            q = v * (1.0 - share * share)
-            H = (
-                H[0] + p * (J[0] * J[0] + J[3] * J[3] + J[6] * J[6] - a0 * a0) + q * b0 * b0,
-                H[1] + p * (J[0] * J[1] + J[3] * J[4] + J[6] * J[7] - a0 * a1) + q * b0 * b1,
-                H[2] + p * (J[0] * J[2] + J[3] * J[5] + J[6] * J[8] - a0 * a2) + q * b0 * b2,
-                H[3] + p * (J[1] * J[1] + J[4] * J[4] + J[7] * J[7] - a1 * a1) + q * b1 * b1,
-                H[4] + p * (J[1] * J[2] + J[4] * J[5] + J[7] * J[8] - a1 * a2) + q * b1 * b2,
-                H[5] + p * (J[2] * J[2] + J[5] * J[5] + J[8] * J[8] - a2 * a2) + q * b2 * b2,
-            )
+            H = add6(H, turned(Jt, (p, 0.0, 0.0, p, 0.0, p)))
+            H = add6(H, outer(-p, a0, a1, a2))
+            H = add6(H, outer(v - p, b0, b1, b2))
             force = v * share * swing
-            g = (g[0] + force * b0, g[1] + force * b1, g[2] + force * b2)
+            g = add3(g, (force * b0, force * b1, force * b2))
         add_to_joint(tree, pose, blocks, i, *H, *g)
     return cost
 

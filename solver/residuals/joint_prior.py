@@ -11,6 +11,7 @@ The gradient is w Omega_mean phi in the parent's axes, because J^-T(phi) phi = p
 import numpy as np
 
 from ..kernel import kernel
+from ..matrices import rotated
 from ..part import Array
 from ..rotations import left_jacobian_inverse3
 from .accumulation import add_to_joint, relative_log, rows_of
@@ -44,9 +45,7 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
         p = (1.0 - q) / s if s > 1e-12 else -1.0 / 12.0
         cost += 0.5 * w * s
         # Omega_mean a: the axis in the parent's axes
-        ax = m[0] * x + m[1] * y + m[2] * z
-        ay = m[3] * x + m[4] * y + m[5] * z
-        az = m[6] * x + m[7] * y + m[8] * z
+        ax, ay, az = rotated(m, (x, y, z))
         add_to_joint(
             tree, pose, blocks, i,
             w * (q + p * ax * ax), w * p * ax * ay, w * p * ax * az,

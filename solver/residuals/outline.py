@@ -18,8 +18,9 @@ correspondences as in iterative closest points, point to line, renewed by the ca
 import numpy as np
 
 from ..kernel import kernel
+from ..matrices import add3, entries, outer, rotated
 from ..part import Array
-from .accumulation import add_to_point, geman_mcclure, lever, outer, rows_of
+from .accumulation import add_to_point, geman_mcclure, lever, rows_of
 from .keypoint2d import Z_MIN
 
 INTS = 1  # point, numbered as in the measurements
@@ -37,12 +38,8 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
         f = floats[k]
         j = ints[k, 0]
         i = tree.point_part[j]
-        R = pose.R[i]
         t = pose.t[i]
-        lx, ly, lz = lever(tree, pose, j)
-        lx += R[0, 0] * f[0] + R[0, 1] * f[1] + R[0, 2] * f[2]
-        ly += R[1, 0] * f[0] + R[1, 1] * f[1] + R[1, 2] * f[2]
-        lz += R[2, 0] * f[0] + R[2, 1] * f[1] + R[2, 2] * f[2]
+        lx, ly, lz = add3(lever(tree, pose, j), rotated(entries(pose.R[i]), f))
         z = lz + t[2]
         if z <= Z_MIN:
             continue

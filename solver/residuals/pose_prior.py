@@ -11,6 +11,7 @@ camera. Source: section 3 of the paper (pose prior on T_i).
 import numpy as np
 
 from ..kernel import kernel
+from ..matrices import product, rotated, symmetric, transposed, turned
 from ..part import GRADIENT, Array
 from ..rotations import left_jacobian_inverse3
 from .accumulation import add_to_point, relative_log, rows_of
@@ -36,18 +37,13 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
         if w_r > 0.0:
             phi = relative_log(h, R)
             cost += 0.5 * w_r * (phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])
-            Ji = left_jacobian_inverse3(phi[0], phi[1], phi[2])
+            Jt = product(h, transposed(left_jacobian_inverse3(*phi)))
+            H = symmetric(turned(Jt, (w_r, 0.0, 0.0, w_r, 0.0, w_r)))
+            g = rotated(Jt, phi)
             for r in range(3):
-                # column r of J = J^-1 R^T, as three numbers
-                a0 = Ji[0] * h[3 * r] + Ji[1] * h[3 * r + 1] + Ji[2] * h[3 * r + 2]
-                a1 = Ji[3] * h[3 * r] + Ji[4] * h[3 * r + 1] + Ji[5] * h[3 * r + 2]
-                a2 = Ji[6] * h[3 * r] + Ji[7] * h[3 * r + 1] + Ji[8] * h[3 * r + 2]
-                A[i, r, GRADIENT] += w_r * (a0 * phi[0] + a1 * phi[1] + a2 * phi[2])
+                A[i, r, GRADIENT] += w_r * g[r]
                 for s in range(3):
-                    b0 = Ji[0] * h[3 * s] + Ji[1] * h[3 * s + 1] + Ji[2] * h[3 * s + 2]
-                    b1 = Ji[3] * h[3 * s] + Ji[4] * h[3 * s + 1] + Ji[5] * h[3 * s + 2]
-                    b2 = Ji[6] * h[3 * s] + Ji[7] * h[3 * s + 1] + Ji[8] * h[3 * s + 2]
-                    A[i, r, s] += w_r * (a0 * b0 + a1 * b1 + a2 * b2)
+                    A[i, r, s] += H[3 * r + s]
         if w_t > 0.0:
             f0 = pose.t[i, 0] - h[9]
             f1 = pose.t[i, 1] - h[10]
