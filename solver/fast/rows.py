@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The functions of gauss_newton/plain_rows.py, four columns at a time; see there what they compute.
 
-Each formula below is run once for every four columns, with all of their rows in registers. Products
-such as C += XᵀZ are computed in tiles of four rows by one to three vectors, which stay in registers
-over all rows of X and Z; only tiles on and above the diagonal are touched.
+Each formula below is run once for every four columns, with all of their rows in registers. Of
+products such as C += XᵀZ, four rows of C are a pass over three rows of Z; only vectors on and above
+the diagonal are touched.
 """
 
 from typing import Any
 
-from ..kernel import kernel
+from ..kernel import expanded_kernel, kernel
 from ..part import GRADIENT, SHAPE
+from ..tree import WIDTH
 from .vectors import in_lanes as in_lanes
-from .vectors import row_pass, tile_of
+from .vectors import row_pass
 
 
 def _dot(a: Any, b: Any) -> Any:
@@ -37,19 +38,25 @@ def _point_formula(s, N, V, moved):  # type: ignore[no-untyped-def]
 
 
 def _origin_formula(s, N, D, moved):  # type: ignore[no-untyped-def]
-    """s: A (6), Z (9), the origin (3), one half; moved: H and D, then D and H."""
-    (x, y, z) = s[15:18]
-    half = s[18]
-    AD = _times(s[:6], D)
-    H = [N[3 + r] + AD[r] * half for r in range(3)]
-    turned = [y * N[5] - z * N[4], z * N[3] - x * N[5], x * N[4] - y * N[3]]
-    angular = [N[r] + turned[r] + _dot(s[6 + 3 * r : 9 + 3 * r], D) for r in range(3)]
-    return angular + [N[3 + r] + AD[r] for r in range(3)], [], [*H, *D, *D, *H]
+    """s: W (6), Z (9), one half; moved: H."""
+    WD = _times(s[:6], D)
+    angular = [N[r] + _dot(s[6 + 3 * r : 9 + 3 * r], D) for r in range(3)]
+    linear = [N[3 + r] + WD[r] for r in range(3)]
+    return angular + linear, [], [N[3 + r] + WD[r] * s[15] for r in range(3)]
+
+
+def _add_rows(c: Any, s: Any, X: Any) -> Any:
+    return c + X[0] * s[0] + X[1] * s[1] + X[2] * s[2]
 
 
 def _add_formula(s, c, X, _):  # type: ignore[no-untyped-def]
     """Return c + Xᵀ s."""
-    return [c[0] + _dot(s, X)], [], []
+    return [_add_rows(c[0], s, X)], [], []
+
+
+def _product_formula(s, C, Z, _):  # type: ignore[no-untyped-def]
+    """Return four rows of C + XᵀZ; s: X by columns (12)."""
+    return [_add_rows(C[r], s[3 * r : 3 * r + 3], Z) for r in range(4)], [], []
 
 
 def _moment_formula(s, A, Y, _):  # type: ignore[no-untyped-def]
@@ -74,49 +81,33 @@ def _parent_formula(s, A_parent, A, Y):  # type: ignore[no-untyped-def]
 
 _place = row_pass(_place_formula, (3, 3, 3))
 _point = row_pass(_point_formula, (6, 3, 6))
-_origin = row_pass(_origin_formula, (6, 3, 12))
+_origin = row_pass(_origin_formula, (6, 3, 3))
 _add = row_pass(_add_formula, (1, 3, 0))
+_product = row_pass(_product_formula, (4, 3, 0))
 _moment = row_pass(_moment_formula, (6, 3, 0))
 _scale = row_pass(_scale_formula, (3, 0, 0))
 _parent = row_pass(_parent_formula, (6, 6, 3))
-_plus1 = tile_of(1, 1)
-_plus2 = tile_of(2, 1)
-_plus3 = tile_of(3, 1)
-_minus1 = tile_of(1, -1)
-_minus2 = tile_of(2, -1)
-_minus3 = tile_of(3, -1)
 
 
-@kernel
-def _add_product(C, X, Z, z, count) -> None:  # type: ignore[no-untyped-def]
-    """C += XᵀZ in the upper triangle of C (W, W), at least; the rows of X, and of Z from z on."""
+@expanded_kernel
+def _add_product(C, sign, X, x, Z, z) -> None:  # type: ignore[no-untyped-def]
+    """C += sign XᵀZ in the upper triangle of C (W, W), at least.
+
+    The last W columns of three rows each: of X from row x on, and of Z from z on.
+    """
     W = C.shape[0]
-    for a in range(0, W, 4):
-        b = a
-        while b + 12 <= W:
-            _plus3(C, a * W + b, W, X, a, W, Z, z * W + b, W, count)
-            b += 12
-        if b + 8 == W:
-            _plus2(C, a * W + b, W, X, a, W, Z, z * W + b, W, count)
-        elif b + 4 == W:
-            _plus1(C, a * W + b, W, X, a, W, Z, z * W + b, W, count)
-
-
-@kernel
-def _subtract_square(C, Y) -> None:  # type: ignore[no-untyped-def]
-    """C -= EᵀE in the upper triangle of C (W, W), at least; E: the rows of Y from `SHAPE` on."""
-    W = C.shape[0]
-    row = Y.shape[1]
-    count = Y.shape[0]
-    for a in range(0, W, 4):
-        b = a
-        while b + 12 <= W:
-            _minus3(C, a * W + b, W, Y, SHAPE + a, row, Y, SHAPE + b, row, count)
-            b += 12
-        if b + 8 == W:
-            _minus2(C, a * W + b, W, Y, SHAPE + a, row, Y, SHAPE + b, row, count)
-        elif b + 4 == W:
-            _minus1(C, a * W + b, W, Y, SHAPE + a, row, Y, SHAPE + b, row, count)
+    row = Z.shape[1]
+    X0 = X[x, X.shape[1] - W :]
+    X1 = X[x + 1, X.shape[1] - W :]
+    X2 = X[x + 2, X.shape[1] - W :]
+    for a in range(0, W, WIDTH):
+        factors = (
+            sign * X0[a], sign * X1[a], sign * X2[a],
+            sign * X0[a + 1], sign * X1[a + 1], sign * X2[a + 1],
+            sign * X0[a + 2], sign * X1[a + 2], sign * X2[a + 2],
+            sign * X0[a + 3], sign * X1[a + 3], sign * X2[a + 3],
+        )  # fmt: skip
+        _product(factors, W - a, C, a * W + a, W, Z, (z + 1) * row - W + a, row, Z, 0, row)
 
 
 @kernel
@@ -132,16 +123,17 @@ def add_point(V, R, W, W_all, eW_all, g, B, C, c, moved) -> None:  # type: ignor
     n = V.shape[1]
     _point(R + eW_all + W + W_all, n, B, SHAPE, B.shape[1], V, 0, n, moved, 0, n)
     _add(g, n, c, 0, n, moved, 0, n, moved, 0, n)
-    _add_product(C, moved, moved, 3, 3)
+    _add_product(C, 1.0, moved, 0, moved, 3)
 
 
 @kernel
-def add_origin(D, A, Z, s, f, B, C, c, moved) -> None:  # type: ignore[no-untyped-def]
-    """C += HᵀD + DᵀH,   N_ang += [s]x N_lin + Z D,   N_lin += A D,   c += Dᵀ f."""
+def add_origin(D, W, Z, f, B, C, c, moved) -> None:  # type: ignore[no-untyped-def]
+    """C += HᵀD + DᵀH,   N_ang += Z D,   N_lin += W D,   c += Dᵀ f."""
     n = D.shape[1]
-    _origin(A + Z + s + (0.5,), n, B, SHAPE, B.shape[1], D, 0, n, moved, 0, n)
+    _origin(W + Z + (0.5,), n, B, SHAPE, B.shape[1], D, 0, n, moved, 0, n)
     _add(f, n, c, 0, n, D, 0, n, D, 0, n)
-    _add_product(C, moved, moved, 6, 6)
+    _add_product(C, 1.0, moved, 0, D, 0)
+    _add_product(C, 1.0, D, 0, moved, 0)
 
 
 @kernel
@@ -177,4 +169,4 @@ def subtract_eliminated(Y, C, c) -> None:  # type: ignore[no-untyped-def]
     for r in range(0, Y.shape[0], 3):
         q = (-Y[r, GRADIENT], -Y[r + 1, GRADIENT], -Y[r + 2, GRADIENT])
         _add(q, W, c, 0, W, Y, r * n + SHAPE, n, Y, 0, n)
-    _subtract_square(C, Y)
+        _add_product(C, -1.0, Y, r, Y, r)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Doubles in vector registers: LLVM code for a pass over rows, for products, and for formulas.
+"""Doubles in vector registers: LLVM code for a pass over rows, and for formulas.
 
 LLVM lowers a vector of four doubles to whatever the processor has (AVX, two NEON registers, ...).
 Arrays are float64 whose rows are contiguous; positions are offsets in elements from the first one.
@@ -23,7 +23,6 @@ _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _INT32 = ir.IntType(32)
 _FLAGS = ("contract", "nsz")
 _declared: Any = cgutils.get_or_insert_function  # untyped
-_variable: Any = cgutils.alloca_once_value  # untyped
 intrinsic: Any = _intrinsic  # its first parameter is the compiler's, which type checkers do not see
 
 
@@ -133,55 +132,6 @@ def row_pass(formula: Callable[..., Sequence[Sequence[Vector]]], rows: Sequence[
         return types.void(scalars, i, a, i, i, b, i, i, c, i, i), generate
 
     return apply
-
-
-def tile_of(vectors: int, sign: int) -> Any:
-    """Return `tile(C, at, c_row, X, x, x_row, Z, z, z_row, count)`: four rows of C, `vectors` wide,
-    += sign XᵀZ.
-    """
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        C, at, c_row, X, x, x_row, Z, z, z_row, count = args
-        c_data, x_data, z_data = (
-            context.make_array(sig.args[k])(context, builder, args[k]).data for k in (0, 3, 6)
-        )
-
-        def vector_at(data: Any, place: Any, v: int) -> Any:
-            place = builder.add(place, ir.Constant(place.type, v * WIDTH))
-            return builder.bitcast(builder.gep(data, [place]), _VECTOR.as_pointer())
-
-        starts = [at]
-        for _ in range(3):
-            starts.append(builder.add(starts[-1], c_row))
-        targets = [[vector_at(c_data, start, v) for v in range(vectors)] for start in starts]
-        sums = [[_variable(builder, builder.load(p, align=8)) for p in row] for row in targets]
-        with cgutils.for_range(builder, count) as loop:
-            left = builder.gep(x_data, [builder.add(x, builder.mul(loop.index, x_row))])
-            right = builder.add(z, builder.mul(loop.index, z_row))
-            values = [builder.load(vector_at(z_data, right, v), align=8) for v in range(vectors)]
-            for r in range(4):
-                splat = _splat_of(
-                    builder, builder.load(builder.gep(left, [ir.Constant(at.type, r)]), align=8)
-                )
-                for v in range(vectors):
-                    product = builder.fmul(splat, values[v], flags=["contract"])
-                    add = builder.fadd if sign > 0 else builder.fsub
-                    builder.store(
-                        add(builder.load(sums[r][v]), product, flags=["contract"]), sums[r][v]
-                    )
-        for row, pointers in zip(sums, targets, strict=True):
-            for total, pointer in zip(row, pointers, strict=True):
-                builder.store(builder.load(total), pointer, align=8)
-        return context.get_dummy_value()
-
-    @intrinsic
-    def tile(  # type: ignore[no-untyped-def]
-        typingctx, C, at, c_row, X, x, x_row, Z, z, z_row, count
-    ):
-        i = types.intp
-        return types.void(C, i, i, X, i, i, Z, i, i, i), generate
-
-    return tile
 
 
 class _Parameters:

@@ -33,7 +33,7 @@ def add_point(V, R, W, W_all, eW_all, g, B, C, c, moved) -> None:  # type: ignor
     """Add what a point V (3, W) of a part's shape adds, with V' = R V:
 
     N += [[e]x W_all; W] V',   C += V'ᵀ W_all V',   c += V'ᵀ g;   N is B (6, 8+W) from `SHAPE` on.
-    R and [e]x W_all (9), W and W_all (6), g (3); the first rows of moved (12, W) become V'.
+    R and [e]x W_all (9), W and W_all (6), g (3); the first rows of moved (6, W) become V'.
     """
     for k in range(V.shape[1]):
         x = R[0] * V[0, k] + R[1] * V[1, k] + R[2] * V[2, k]
@@ -60,29 +60,29 @@ def add_point(V, R, W, W_all, eW_all, g, B, C, c, moved) -> None:  # type: ignor
 
 
 @kernel
-def add_origin(D, A, Z, s, f, B, C, c, moved) -> None:  # type: ignore[no-untyped-def]
-    """Add the motion D (3, W) of a part's origin s to its sums, which are shifted to the pelvis:
+def add_origin(D, W, Z, f, B, C, c, moved) -> None:  # type: ignore[no-untyped-def]
+    """Add the motion D (3, W) of a part's origin to its sums:
 
-    C += HᵀD + DᵀH with H = N_lin + A D / 2,   N_ang += [s]x N_lin + Z D,   N_lin += A D,
-    c += Dᵀ f.  A (6), Z (9), s and f (3); moved (12, W) is overwritten.
+    C += HᵀD + DᵀH with H = N_lin + W D / 2,   N_ang += Z D,   N_lin += W D,   c += Dᵀ f.
+    W (6), Z (9), f (3); moved (6, W) is overwritten.
     """
     for k in range(D.shape[1]):
-        n0 = B[3, SHAPE + k]
-        n1 = B[4, SHAPE + k]
-        n2 = B[5, SHAPE + k]
-        a0 = A[0] * D[0, k] + A[1] * D[1, k] + A[2] * D[2, k]
-        a1 = A[1] * D[0, k] + A[3] * D[1, k] + A[4] * D[2, k]
-        a2 = A[2] * D[0, k] + A[4] * D[1, k] + A[5] * D[2, k]
-        B[0, SHAPE + k] += s[1] * n2 - s[2] * n1 + Z[0] * D[0, k] + Z[1] * D[1, k] + Z[2] * D[2, k]
-        B[1, SHAPE + k] += s[2] * n0 - s[0] * n2 + Z[3] * D[0, k] + Z[4] * D[1, k] + Z[5] * D[2, k]
-        B[2, SHAPE + k] += s[0] * n1 - s[1] * n0 + Z[6] * D[0, k] + Z[7] * D[1, k] + Z[8] * D[2, k]
-        B[3, SHAPE + k] = n0 + a0
-        B[4, SHAPE + k] = n1 + a1
-        B[5, SHAPE + k] = n2 + a2
-        c[k] += f[0] * D[0, k] + f[1] * D[1, k] + f[2] * D[2, k]
-        moved[0, k] = n0 + 0.5 * a0
-        moved[1, k] = n1 + 0.5 * a1
-        moved[2, k] = n2 + 0.5 * a2
+        x = D[0, k]
+        y = D[1, k]
+        z = D[2, k]
+        a0 = W[0] * x + W[1] * y + W[2] * z
+        a1 = W[1] * x + W[3] * y + W[4] * z
+        a2 = W[2] * x + W[4] * y + W[5] * z
+        moved[0, k] = B[3, SHAPE + k] + 0.5 * a0
+        moved[1, k] = B[4, SHAPE + k] + 0.5 * a1
+        moved[2, k] = B[5, SHAPE + k] + 0.5 * a2
+        B[0, SHAPE + k] += Z[0] * x + Z[1] * y + Z[2] * z
+        B[1, SHAPE + k] += Z[3] * x + Z[4] * y + Z[5] * z
+        B[2, SHAPE + k] += Z[6] * x + Z[7] * y + Z[8] * z
+        B[3, SHAPE + k] += a0
+        B[4, SHAPE + k] += a1
+        B[5, SHAPE + k] += a2
+        c[k] += f[0] * x + f[1] * y + f[2] * z
     for a in range(D.shape[1]):
         for b in range(D.shape[1]):
             for r in range(3):

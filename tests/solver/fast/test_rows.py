@@ -23,15 +23,15 @@ def arguments(name, W, rng):
     C = rng.normal(size=(W, W))
     c = rng.normal(size=W)
     V = rng.normal(size=(3, W))
-    moved = np.zeros((12, W))
+    moved = np.zeros((6, W))
     vectors = [numbers(rng, count) for count in (9, 6, 6, 9, 3)]
     return {
         "place_origin": ((V, numbers(rng, 9), rng.normal(size=(3, W)), np.zeros((3, W))), [3]),
         # the focal length's column needs the first rows of the memory, the turned point
         "add_point": ((V, *vectors, A, C, c, moved), [6, 7, 8, 9]),
         "add_origin": (
-            (V, numbers(rng, 6), numbers(rng, 9), numbers(rng, 3), numbers(rng, 3), A, C, c, moved),
-            [5, 6, 7],
+            (V, numbers(rng, 6), numbers(rng, 9), numbers(rng, 3), A, C, c, moved),
+            [4, 5, 6],
         ),
         "take_moment": ((A, numbers(rng, 3), Y), [2]),
         "scale_rows": ((numbers(rng, 6), Y), [1]),
