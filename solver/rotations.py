@@ -140,34 +140,6 @@ def hat(phi: ArrayLike) -> Array:
     return out - np.swapaxes(out, -1, -2)
 
 
-def _squares_and_angles(phi: Array) -> tuple[Array, Array, Array]:
-    """Return th^2, whether it is small, and th, or 1 where it is; each (..., 1, 1)."""
-    s = np.sum(phi * phi, axis=-1)[..., None, None]
-    small = s < 1e-2
-    return s, small, np.sqrt(np.where(small, 1.0, s))
-
-
-def _sine(s: Array, small: Array, th: Array) -> Array:
-    """Return sin(th)/th."""
-    return np.where(small, 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0)), np.sin(th) / th)
-
-
-def _versine(s: Array, small: Array, th: Array) -> Array:
-    """Return (1 - cos(th))/th^2."""
-    return np.where(
-        small,
-        0.5 - s / 24.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0)),
-        2.0 * (np.sin(0.5 * th) / th) ** 2,
-    )
-
-
-def _lag(s: Array, small: Array, th: Array) -> Array:
-    """Return (th - sin(th))/th^3."""
-    return np.where(
-        small, 1 / 6.0 - s / 120.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0)), (th - np.sin(th)) / th**3
-    )
-
-
 def exp(phi: ArrayLike) -> Array:
     """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3), radians.
 
@@ -183,9 +155,10 @@ def exp(phi: ArrayLike) -> Array:
             UnitsWarning,
             stacklevel=2,
         )
-    angles = _squares_and_angles(phi)
+    # numpy's sinc(x) is sin(pi x) / (pi x)
+    turns = np.linalg.norm(phi, axis=-1)[..., None, None] / np.pi
     cross = hat(phi)
-    return np.eye(3) + _sine(*angles) * cross + _versine(*angles) * (cross @ cross)
+    return np.eye(3) + np.sinc(turns) * cross + 0.5 * np.sinc(0.5 * turns) ** 2 * (cross @ cross)
 
 
 def log(rotation: ArrayLike) -> Array:
@@ -203,17 +176,6 @@ def log(rotation: ArrayLike) -> Array:
         small, 2.0 - 2.0 / 3.0 * n * n, 2.0 * np.arctan2(n, w) / np.where(small, 1.0, n)
     )
     return phi
-
-
-def left_jacobian(phi: ArrayLike) -> Array:
-    """Return J(phi) = I + b [phi]x + c [phi]x^2, shape (..., 3, 3).
-
-    :raises ShapeError: the vectors have another shape.
-    """
-    phi = as_arrays(phi, (3,), "A rotation vector")
-    angles = _squares_and_angles(phi)
-    cross = hat(phi)
-    return np.eye(3) + _versine(*angles) * cross + _lag(*angles) * (cross @ cross)
 
 
 def quaternion_from_matrix(rotation: ArrayLike) -> Array:

@@ -262,7 +262,6 @@ CALLS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     "rotations.hat": (rotations.hat, VECTORS),
     "rotations.exp": (rotations.exp, VECTORS),
     "rotations.log": (rotations.log, MATRICES),
-    "rotations.left_jacobian": (rotations.left_jacobian, VECTORS),
     "rotations.quaternion_from_matrix": (rotations.quaternion_from_matrix, MATRICES),
     "rotations.matrix_from_quaternion": (
         rotations.matrix_from_quaternion,
