@@ -26,7 +26,6 @@ if TYPE_CHECKING:  # the public names and their modules, in the only place that 
     from .errors import ScopeWarning as ScopeWarning
     from .errors import ShapeError as ShapeError
     from .errors import UnitsWarning as UnitsWarning
-    from .fitting.batch import fit_batch as fit_batch
     from .fitting.clip import carry as carry
     from .fitting.clip import fit_clip as fit_clip
     from .fitting.derivatives import SolutionDerivatives as SolutionDerivatives
@@ -34,6 +33,7 @@ if TYPE_CHECKING:  # the public names and their modules, in the only place that 
     from .fitting.derivatives import solution_gradient as solution_gradient
     from .fitting.frame_solver import FrameSolver as FrameSolver
     from .fitting.frame_solver import fit as fit
+    from .fitting.frame_solver import fit_batch as fit_batch
     from .fitting.frame_solver import fit_tree as fit_tree
     from .fitting.normal_equations import GaussNewtonStep as GaussNewtonStep
     from .fitting.normal_equations import NormalEquations as NormalEquations
