@@ -9,8 +9,9 @@ itself says nothing:
   image, as if it had been solved in front of the body and then behind it;
 - lean: the weight is held beside the feet for seconds, where anybody would fall;
 - floating: both feet are above the floor for longer than a jump takes;
-- leap: the body is elsewhere within a few frames, and slow before and after that, as where footage
-  leaves out what happened, or somebody else is followed;
+- leap: the body is elsewhere within a few frames, or in another pose from one frame to the next,
+  and slow before and after that, as where footage leaves out what happened, or somebody else is
+  followed;
 - bent knees: a person who stands or walks never straightens a knee in the whole clip.
 
 It may be true: of a punch, of somebody who is held or hangs, of a crouch.
@@ -42,6 +43,12 @@ FLOATING_M = 0.25  # of both ankles' height above that at which they stand
 FLOATING_S = 1.2  # a jump of 1.7 m
 LEAP_M_S = 8.0  # across the line of sight; in 40 captures without a leap, below 6
 LEAP_S = 0.3  # within which the body is less than half as fast before it, and after it
+# Of a leap's step, across the line of sight. The mean of all keypoints moves by at most 0.07 m more
+# than in any step near it in 60 captures without a leap, and by 0.2 m and more in six with one.
+LEAP_M = 0.15
+POSE_LEAP_M_S = 3.0
+_SURE_KEYPOINT = 0.5  # confidence
+_FEWEST_KEYPOINTS = 10  # of a body; fewer are a limb
 BENT_KNEE_DEG = 155.0  # the straightest knee of a standing person
 STANDING = 0.85  # distance of hip and ankle over the leg's length, from which a person stands
 BENT_S = 3.0  # of standing, in which a knee is straight at some time
@@ -139,7 +146,7 @@ def implausible(motion: Motion) -> dict[str, BoolArray]:
         "swing": _swings(motion) & motion.valid,
         "lean": _leans(motion, joints) & motion.valid,
         "floating": _floats(motion, joints) & motion.valid,
-        "leap": _leaps(motion, joints[:, _AT["pelvis"]]) & motion.valid,
+        "leap": (_leaps(motion, joints[:, _AT["pelvis"]]) | _pose_leaps(motion)) & motion.valid,
     }
 
 
@@ -225,15 +232,52 @@ def _leaps(motion: Motion, pelvis: Float64Array) -> BoolArray:
     sight = unit_vectors(pelvis - motion.world_from_camera[:, :3, 3])
     steps = np.diff(pelvis, axis=0)
     across = steps - (steps * sight[1:]).sum(axis=1, keepdims=True) * sight[1:]
-    speed = np.linalg.norm(across, axis=1) / np.diff(times)
+    moved_m = np.linalg.norm(across, axis=1)
+    speed = moved_m / np.diff(times)
     is_seen = motion.valid[1:] & motion.valid[:-1]
     found = np.zeros(len(motion), bool)
-    for k in np.flatnonzero((speed > LEAP_M_S) & is_seen):
-        before = speed[:k][times[k] - times[:k] <= LEAP_S]
-        after = speed[k + 1 :][times[k + 2 :] - times[k + 1] <= LEAP_S]
+    for k in np.flatnonzero((speed > LEAP_M_S) & (moved_m > LEAP_M) & is_seen):
+        before, after = _near_steps(times, speed, k)
         if all(len(others) and others.min() < 0.5 * speed[k] for others in (before, after)):
             found[k : k + 2] = True
     return found
+
+
+def _pose_leaps(motion: Motion) -> BoolArray:
+    """Return the frames (T,) before and after a step in which all keypoints together move far more
+    than in those near it, where a moment is left out of footage of a camera that stays.
+
+    With rays d = R_world_camera K⁻¹ (u, v, 1), the keypoints move by the mean of z |Δd|, z the
+    depth of the pelvis. A limb that is mistaken for another one is a small part of that.
+    """
+    times = motion.times_with_gaps
+    pixels = motion.keypoints2d[..., :2].astype(float)
+    homogeneous = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=-1)
+    R_world_camera = motion.world_from_camera[:, None, :3, :3]
+    K_inverse = np.linalg.inv(motion.intrinsics_of_frames)[:, None]
+    rays = (R_world_camera @ K_inverse @ homogeneous[..., None])[..., 0]
+    depth = motion.joints_cam[1:, _AT["pelvis"], 2]
+    moved_m = depth[:, None] * np.linalg.norm(np.diff(rays, axis=0), axis=-1)
+    is_sure = (motion.keypoints2d[..., 2] > _SURE_KEYPOINT) & motion.valid[:, None]
+    counts = is_sure[1:] & is_sure[:-1]
+    mean_m = np.where(counts, moved_m, 0.0).sum(axis=1) / np.maximum(counts.sum(axis=1), 1)
+    found = np.zeros(len(motion), bool)
+    for k in np.flatnonzero((mean_m > LEAP_M) & (counts.sum(axis=1) >= _FEWEST_KEYPOINTS)):
+        before, after = _near_steps(times, mean_m, k)
+        if len(before) and len(after):
+            beyond_m = mean_m[k] - max(before.max(), after.max())
+            is_fast = beyond_m > POSE_LEAP_M_S * (times[k + 1] - times[k])
+            found[k : k + 2] |= beyond_m > LEAP_M and is_fast
+    return found
+
+
+def _near_steps(
+    times: Float64Array, values: Float64Array, k: int
+) -> tuple[Float64Array, Float64Array]:
+    """Return the values (T - 1,) of the steps up to `LEAP_S` before and after the k-th one."""
+    before = values[:k][times[k] - times[:k] <= LEAP_S]
+    after = values[k + 1 :][times[k + 2 :] - times[k + 1] <= LEAP_S]
+    return before, after
 
 
 def _distance(point: Float64Array, a: Float64Array, b: Float64Array) -> Float64Array:

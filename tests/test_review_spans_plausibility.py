@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -164,3 +165,79 @@ def test_a_body_that_is_elsewhere_from_one_frame_to_the_next_is_found() -> None:
     assert not implausible(replace(leaps, valid=seen))["leap"].any()
     across[90:, 0] = np.minimum(9.0 * (WALK.timestamps[90:] - WALK.timestamps[90]), 9.0)
     assert not implausible(moved(dict.fromkeys(AT, across)))["leap"].any()
+
+
+def seen_at(at: np.ndarray) -> Motion:
+    """The walk, from a camera 10 m to the side, with keypoints where these points (T, K, 3) in the
+    world are seen; the body stays where it was, as if it had been fitted loosely.
+    """
+    R = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # looks along minus x
+    T = np.tile(np.eye(4), (len(WALK), 1, 1))
+    T[:, :3, :3] = R
+    T[:, :3, 3] = [10.0, at[0, 0, 1], 1.0]
+    pixels = (at - T[:, None, :3, 3]) @ R @ WALK.intrinsics.T
+    before = WALK.world_from_camera
+    joints = np.einsum("tij,tkj->tki", before[:, :3, :3], WALK.joints_cam) + before[:, None, :3, 3]
+    sure = np.ones_like(pixels[..., :1])
+    return replace(
+        WALK,
+        world_from_camera=T,
+        joints_cam=((joints - T[:, None, :3, 3]) @ R).astype(np.float32),
+        keypoints2d=np.concatenate([pixels[..., :2] / pixels[..., 2:], sure], axis=2),
+        keypoints2d_names=np.array([f"point{k}" for k in range(at.shape[1])]),
+    )
+
+
+def test_a_pose_that_is_another_one_from_one_frame_to_the_next_is_found() -> None:
+    """As at a jump cut while the person stays; not at a marked cut, nor within half a second."""
+    at = joints_in_world(WALK)
+    other = np.random.default_rng(1).normal(scale=0.3, size=(at.shape[1], 3))
+    other[0] = 0.0
+    jumps = at.copy()
+    jumps[90:] += other
+    found = seen_at(jumps)
+    assert np.flatnonzero(implausible(found)["leap"]).tolist() == [89, 90]
+    assert not implausible(replace(found, scene_starts=np.array([90])))["leap"].any()
+    share = np.clip((WALK.timestamps - WALK.timestamps[90]) / 0.5, 0.0, 1.0)
+    moves = at + share[:, None, None] * other
+    assert not implausible(seen_at(moves))["leap"].any()
+
+
+def boxing() -> np.ndarray:
+    """Both hands strike in turn, 0.6 m at 10 m/s, with the elbows half as far."""
+    at = joints_in_world(WALK)
+    for k, side in enumerate(("left", "right")):
+        phase = (WALK.timestamps + 0.3 * k) % 0.6
+        reach = 0.3 * (1.0 - np.cos(2.0 * np.pi * np.clip(phase / 0.19, 0.0, 1.0)))
+        at[:, AT[f"{side}_wrist"], 1] += reach
+        at[:, AT[f"{side}_elbow"], 1] += 0.5 * reach
+    return at
+
+
+def sprinting() -> np.ndarray:
+    """Starts to run at 10 m/s within half a second, past the camera."""
+    at = joints_in_world(WALK)
+    t = np.maximum(WALK.timestamps - WALK.timestamps[60], 0.0)
+    at[..., 1] += np.where(t < 0.5, 10.0 * t**2, 10.0 * (t - 0.25))[:, None]
+    return at
+
+
+def one_limb_mistaken() -> np.ndarray:
+    at = joints_in_world(WALK)
+    arm = [AT[f"left_{part}"] for part in ("shoulder", "elbow", "wrist")]
+    other = [AT[f"right_{part}"] for part in ("shoulder", "elbow", "wrist")]
+    at[90:, arm] = at[90:, other]
+    return at
+
+
+@pytest.mark.parametrize("acting", [boxing, sprinting, one_limb_mistaken])
+def test_what_a_body_can_do_is_no_leap(acting: Callable[[], np.ndarray]) -> None:
+    assert not implausible(seen_at(acting()))["leap"].any()
+
+
+def test_a_small_step_at_a_high_rate_is_no_leap() -> None:
+    """The fit of a slow-motion clip shifts by 6 cm in one frame, which are 14 m/s."""
+    across = np.zeros((len(WALK), 3))
+    across[90:, 0] = 0.06
+    shifted = moved(dict.fromkeys(AT, across))
+    assert not implausible(replace(shifted, timestamps=np.arange(len(WALK)) / 240))["leap"].any()
