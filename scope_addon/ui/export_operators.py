@@ -18,7 +18,7 @@ from bpy.types import Collection, Context, Event, Object, Scene
 
 from ..errors import UsageError
 from ..options import Place
-from ..output_paths import check_output, files_of_people, left_over, person_paths
+from ..output_paths import SUFFIXES, check_output, files_of_people, left_over, person_paths
 from ..scene.datablocks import captures_of, holds
 from ..temporary import hold, release
 from .captured_person import body_of, motion_of, stored_person
@@ -186,10 +186,15 @@ class SCOPE_OT_export(SavingOperator):
     def work(self, context: Context) -> str:
         """Write the files.
 
-        :raises UsageError: the file has no name or folder, or there is nothing of what is to be
-            written.
+        :raises UsageError: the file has no name or folder, its suffix is that of a format which
+            only the command line writes, or there is nothing of what is to be written.
         """
+        typed = Path(self.filepath)
+        of_suffix = {suffix: kind for kind, suffix in _SUFFIX.items()}
+        self.format = of_suffix.get(typed.suffix.lower(), self.format)
         path = output_file(self.filepath, self.suffix())
+        if typed.suffix.lower() in set(SUFFIXES).difference(of_suffix):
+            check_output(typed, tuple(of_suffix))
         _check_available(self.format)
         warnings: list[Notice] = []
         options = self._options(warnings)

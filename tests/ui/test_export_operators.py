@@ -49,6 +49,26 @@ def test_only_the_active_capture_is_written(both, tmp_path, which):
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["é ☃.npz"]
 
 
+@pytest.mark.parametrize("name", ["a.npz", "a.BVH", "a.trc", "a.glb"])
+def test_the_suffix_that_is_typed_decides_the_format(tmp_path, name):
+    captured_with(motion_of(walk(0.2)))
+    (tmp_path / "out").mkdir()
+    bpy.ops.scope.export(filepath=str(tmp_path / "out" / name))
+    (path,) = (tmp_path / "out").iterdir()
+    assert path.name == name
+    starts = {".npz": b"PK", ".bvh": b"HIERARCHY", ".trc": b"PathFileType", ".glb": b"glTF"}
+    assert path.read_bytes().startswith(starts[path.suffix.lower()])
+
+
+def test_a_dot_in_a_name_is_no_format_and_formats_of_the_command_line_are_refused(tmp_path):
+    captured_with(motion_of(walk(0.2)))
+    (tmp_path / "out").mkdir()
+    with pytest.raises(RuntimeError, match=r"annot write 'a\.blend': its suffix must be one of"):
+        bpy.ops.scope.export(filepath=str(tmp_path / "out" / "a.blend"), format="NPZ")
+    bpy.ops.scope.export(filepath=str(tmp_path / "out" / "walk.v2"), format="NPZ")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["walk.v2.npz"]
+
+
 @pytest.mark.parametrize("which", [0, 1])
 def test_the_person_of_the_selected_capture_is_found(both, which):
     bpy.context.view_layer.objects.active = None
