@@ -145,6 +145,11 @@ def draw_overlay(
         if per_face.ndim == 2 and len(per_face) != len(triangles):
             per_face = np.concatenate([per_face, per_face])  # a quad's two halves
         rasterize(canvas, vertices, triangles, per_face, intrinsics, dist, opacity)
+    return blended(image_rgb, canvas)
+
+
+def blended(image_rgb: Uint8Array, canvas: Canvas) -> Uint8Array:
+    """Return a copy of an (H, W, 3) uint8 image with the canvas over it."""
     out = np.ascontiguousarray(image_rgb).copy()
     _blend(out, canvas.rgba)
     return out

@@ -14,12 +14,13 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Uint8Array
 from ..atomic_write import atomic_path
 from ..capture.camera.intrinsics import scaled_intrinsics
 from ..capture.fitting.live_body import LiveBody, LivePose
@@ -140,10 +141,10 @@ def _pose(observation: Observation, live: LiveBody) -> LivePose | None:
 
 
 def draw(
-    image_rgb: NDArray[np.uint8],
+    image_rgb: Uint8Array,
     people: Sequence[Observation],
     poses: Sequence[LivePose | None] = (),
-) -> NDArray[np.uint8]:
+) -> Uint8Array:
     """Draw everybody's body, or else skeleton, over a frame that is scaled down to ``LONGER_SIDE``.
 
     :param image_rgb: (H, W, 3) the frame.
@@ -160,10 +161,11 @@ def draw(
             large = _with_body(large, pose, scale * _SUPERSAMPLE)
         else:
             _draw_skeleton(large, person, scale * _SUPERSAMPLE)
-    return cv2.cvtColor(cv2.resize(large, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2RGBA)
+    small = cv2.resize(large, size, interpolation=cv2.INTER_AREA)
+    return cast(Uint8Array, cv2.cvtColor(small, cv2.COLOR_RGB2RGBA))
 
 
-def _with_body(image: NDArray[np.uint8], pose: LivePose, scale: float) -> NDArray[np.uint8]:
+def _with_body(image: Uint8Array, pose: LivePose, scale: float) -> Uint8Array:
     intrinsics = scaled_intrinsics(pose.camera.intrinsics, scale)
     colors = body_colors(pose.body, 0)
     return draw_overlay(
@@ -177,7 +179,7 @@ def _with_body(image: NDArray[np.uint8], pose: LivePose, scale: float) -> NDArra
     )
 
 
-def _draw_skeleton(image: NDArray[np.uint8], observation: Observation, scale: float) -> None:
+def _draw_skeleton(image: Uint8Array, observation: Observation, scale: float) -> None:
     """Draw the limbs between confident keypoints into the image, in place."""
     pixels = np.round((observation.keypoints_px + 0.5) * scale).astype(int)
     for a, b, color in _LINES:
