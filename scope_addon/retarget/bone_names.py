@@ -32,7 +32,7 @@ CENTRE = {
     "spine": (
         *("spine", "chest", "upperchest", "torso", "abdomen", "waist", "uppertorso", "thorax"),
         *("abdomenlower", "abdomenupper", "chestlower", "chestupper", "lowerback", "upperback"),
-        *("vertebra", "ab", "上半身"),
+        *("vertebra", "ab", "ribcage", "上半身"),
     ),
     "neck": ("neck", "necktwist", "necklower", "neckupper", "lowerneck", "upperneck", "首"),
     "head": ("head", "頭"),
@@ -46,6 +46,7 @@ LIMBS = {
         "leg",
         "lowerleg",
         "lowleg",
+        "loleg",
         "leglower",
         "knee",
         "tibia",
@@ -59,7 +60,10 @@ LIMBS = {
     "shoulder": (
         *("upperarm", "uparm", "armupper", "arm", "shldr", "shoulder", "humerus", "uarm", "腕"),
     ),
-    "elbow": ("forearm", "lowerarm", "lowarm", "armlower", "elbow", "radius", "farm", "ひじ", "肘"),
+    "elbow": (
+        *("forearm", "lowerarm", "lowarm", "loarm", "armlower", "elbow", "radius", "farm"),
+        *("ひじ", "肘"),
+    ),
     "wrist": ("wrist", "hand", "手首", "palm"),
 }
 _LIMB_WORDS = {word for words in LIMBS.values() for word in words}

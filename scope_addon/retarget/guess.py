@@ -8,7 +8,7 @@ rest pose does, and what they give must be possible in it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from itertools import product
 
 import numpy as np
@@ -22,6 +22,8 @@ from .rest_pose import RestPose, faces_backwards, rest_faults
 
 _LEG = ("hip", "knee", "ankle", "foot")
 _ARM = ("collar", "shoulder", "elbow", "wrist")
+# Other parts of a limb may be missing.
+_JOINTS = (*_LEG[:3], *_ARM[1:])
 # Confidence where name and geometry agree, of a name alone, of geometry alone, and of what cannot
 # be right at rest.
 _AGREED = 1.0
@@ -42,11 +44,13 @@ _NEAR = 0.005
 # Lengths of mirror images differ by no more than this share.
 _ALIKE = 0.03
 _SLIGHT = 0.01  # The weight of a bone without a mirror image.
+# What is higher than this share of the highest bone in the middle belongs to the head.
+_HIGH = 0.9
 # The tip of a head is above it by more than this multiple of the neck's bones.
 _TIP_LENGTH = 1.4
 
 
-def guess(rest: RestPose, *, is_mirrored: bool = False) -> BoneMap:
+def guess(rest: RestPose, *, is_mirrored: bool = False, held: Collection[str] = ()) -> BoneMap:
     """Guess the most likely map: by name, and by geometry where names say nothing.
 
     Confidence is 1 where name and geometry agree, 0.8 for a name alone, 0.5 for geometry alone, and
@@ -54,8 +58,13 @@ def guess(rest: RestPose, *, is_mirrored: bool = False) -> BoneMap:
 
     :param is_mirrored: whether the rig as a whole is, so that what its names call left is on its
         right; where it has toes, they tell.
+    :param held: bones that constraints turn; others that begin where they do are preferred.
     """
     rigify = _rigify(rest.names)
+    if rigify is None and (spare := _spare(rest, held)):
+        free = guess(_without(rest, spare), is_mirrored=is_mirrored)
+        if not _is_impossible(rest, free.parts):
+            return _with_limbs(free, guess(rest, is_mirrored=is_mirrored))
     shaped = by_geometry(rest)
     named = rigify or by_name(rest)
     if _is_impossible(rest, named) and not _is_impossible(rest, shaped):
@@ -149,6 +158,45 @@ def _lacking(named: Mapping[str, str], shaped: Mapping[str, str]) -> dict[str, s
         if _limb_of(part) not in limbs or beside & agreed:
             found[bone] = part
     return found
+
+
+def _spare(rest: RestPose, held: Collection[str]) -> set[str]:
+    """Return the held bones that begin where one begins that is not."""
+    free = rest.heads[[name not in held for name in rest.names]]
+    return {
+        name
+        for name, head in zip(rest.names, rest.heads, strict=True)
+        if name in held and (np.linalg.norm(free - head, axis=1) < _NEAR * rest.size).any()
+    }
+
+
+def _without(rest: RestPose, bones: Collection[str]) -> RestPose:
+    """Return the pose without some bones; those above them carry what they carried."""
+    kept: list[int] = []
+    row_of = {-1: -1}
+    for bone, parent in enumerate(rest.parents.tolist()):
+        if rest.names[bone] in bones:
+            row_of[bone] = row_of[parent]
+        else:
+            row_of[bone] = len(kept)
+            kept.append(bone)
+    parents = [row_of[int(rest.parents[bone])] for bone in kept]
+    return RestPose([rest.names[bone] for bone in kept], np.array(parents, int), rest.heads[kept])
+
+
+def _with_limbs(free: BoneMap, whole: BoneMap) -> BoneMap:
+    """Return the first map with the limbs of the second of which it lacks a joint."""
+    there = set(free.parts.values())
+    limbs = set(map(_limb_of, there))
+    lacking = {
+        _limb_of(part)
+        for part in set(whole.parts.values()) - there
+        if part.endswith(_JOINTS) or _limb_of(part) not in limbs
+    }
+    parts = {bone: part for bone, part in free.parts.items() if _limb_of(part) not in lacking}
+    parts |= {bone: part for bone, part in whole.parts.items() if _limb_of(part) in lacking}
+    known = whole.confidence | free.confidence
+    return BoneMap(parts, {bone: known[bone] for bone in parts})
 
 
 def _limb_of(part: str) -> str:
@@ -270,7 +318,12 @@ def _trunk_by_name(
         limbs.get(f"{side}_collar", limbs.get(f"{side}_shoulder", -1)) for side in OTHER_SIDE
     ]
     arms = [bone for bone in collars if bone >= 0]
-    head = next(iter(named("head")), None)
+    above_arms = {bone for arm in arms for bone in rest.chains[arm]}
+    head = max(
+        named("head"),
+        key=lambda bone: len(above_arms.intersection(rest.chains[bone])),
+        default=None,
+    )
     chest = _chest(rest, arms, head, named("spine"))
     pelvis = _pelvis(rest, thighs, chest, named("pelvis"))
     central = rest.chains[chest] if chest is not None else []
@@ -287,6 +340,8 @@ def _trunk_by_name(
     else:  # The hierarchy of a control rig need not lead from the pelvis to the arms.
         spine = [bone for bone in spine if bone != pelvis]
     necks = named("neck")
+    if head is not None:
+        necks = [bone for bone in necks if rest.is_below(head, bone)] or necks
     if not necks and len(arms) == 2 and head is not None and chest in rest.chains[head]:
         chain = rest.chains[head]
         necks = _distinct(rest, chain[chain.index(chest) + 1 : -1])
@@ -359,14 +414,27 @@ def by_geometry(rest: RestPose) -> dict[str, str]:
         for bone, children in enumerate(rest.children)
         if not children and not parse_names([rest.names[bone]])[0].is_goal
     ]
-    chains = _limb_chains(rest, leaves, upwards, leftwards)
-    if not {"left leg", "right leg"} <= chains.keys():
+    ends = _limb_ends(rest, leaves, upwards, leftwards)
+    if not (ends["left leg"] and ends["right leg"]):
         return {}
+    central = np.flatnonzero(abs(leftwards) < 0.1).tolist() or leaves
+    highest = max(upwards[bone] for bone in central)
+    ends["head"] = [bone for bone in central if upwards[bone] > _HIGH * highest]
+    person = _person(rest, list(ends.values()))
+    for limb, bones in ends.items():
+        ends[limb] = [bone for bone in bones if person in rest.chains[bone]] or bones
+    chains: dict[str, list[int]] = {}
+    for side, outwards in (("left", leftwards), ("right", -leftwards)):
+        leg = f"{side} leg"
+        arm = f"{side} arm"
+        chains[leg] = min((rest.chains[bone] for bone in ends[leg]), key=len)
+        if ends[arm]:
+            # One hand's fingers, not another chain that ends at the same place.
+            chains[arm] = rest.chains[max(ends[arm], key=lambda bone: outwards[bone])]
     shared = [bone for bone in chains["left leg"] if bone in chains["right leg"]]
     if not shared:
         return {}
-    central = np.flatnonzero(abs(leftwards) < 0.1).tolist()
-    top = rest.chains[max(central or leaves, key=lambda bone: upwards[bone])]
+    top = rest.chains[max(ends["head"], key=lambda bone: upwards[bone])]
     carrying = [bone for bone in shared if bone in top]
     found = {rest.names[carrying[-1] if carrying else shared[-1]]: "pelvis"}
     for limb, chain in chains.items():
@@ -421,26 +489,36 @@ def _sideways(rest: RestPose) -> Float64Array:
     return sign * np.array([x, y])
 
 
-def _limb_chains(
-    rest: RestPose,
-    leaves: list[int],
-    upwards: Float64Array,
-    leftwards: Float64Array,
+def _limb_ends(
+    rest: RestPose, leaves: list[int], upwards: Float64Array, leftwards: Float64Array
 ) -> dict[str, list[int]]:
-    """Return the bones from the root to the end of each limb that is found, such as ``left leg``.
+    """Return the bones at which each limb may end, such as ``left leg``.
 
     :param leaves: bones without children.
     """
-    chains: dict[str, list[int]] = {}
+    ends: dict[str, list[int]] = {}
     for side, outwards in (("left", leftwards), ("right", -leftwards)):
-        legs = [bone for bone in leaves if _is_leg(rest.chains[bone], upwards, outwards)]
-        arms = [bone for bone in leaves if outwards[bone] > 0.1 and upwards[bone] > 0.3]
-        if legs:
-            chains[f"{side} leg"] = min((rest.chains[bone] for bone in legs), key=len)
-        if arms:
-            # One hand's fingers, not another chain that ends at the same place.
-            chains[f"{side} arm"] = rest.chains[max(arms, key=lambda bone: outwards[bone])]
-    return chains
+        ends[f"{side} leg"] = [b for b in leaves if _is_leg(rest.chains[b], upwards, outwards)]
+        ends[f"{side} arm"] = [b for b in leaves if outwards[b] > 0.1 and upwards[b] > 0.3]
+    return ends
+
+
+def _person(rest: RestPose, ends: list[list[int]]) -> int:
+    """Return the bone that carries most of limbs and head: of those, one that is called FK, or the
+    deepest, as a rig may have the same person several times.
+
+    :param ends: the bones at which each of them may end.
+    """
+    carried: list[set[int]] = [set() for _ in rest.names]
+    for limb, bones in enumerate(ends):
+        for bone in bones:
+            for above in rest.chains[bone]:
+                carried[above].add(limb)
+    is_fk = [name.is_fk for name in parse_names(rest.names)]
+    return max(
+        range(len(rest.names)),
+        key=lambda bone: (len(carried[bone]), is_fk[bone], len(rest.chains[bone])),
+    )
 
 
 def _is_leg(chain: list[int], upwards: Float64Array, outwards: Float64Array) -> bool:

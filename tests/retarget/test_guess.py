@@ -121,3 +121,56 @@ def test_names_tell_the_sides_of_a_rig_without_toes(angle: float) -> None:
     assert found.parts == {
         name: part_of[bones.names[row]] for name, row in zip(names, kept, strict=True)
     }
+
+
+def doubled(bones: RestPose, first: str, second: str) -> RestPose:
+    """Return a rig that has all bones twice: below a root that is where the pelvis is, and alone.
+
+    :param first: what the names of the former begin with.
+    :param second: what the names of the latter begin with.
+    """
+    count = len(bones.names)
+    below_root = np.where(bones.parents < 0, 0, bones.parents + 1)
+    alone = np.where(bones.parents < 0, -1, bones.parents + 1 + count)
+    return RestPose(
+        ["Global", *(prefix + name for prefix in (first, second) for name in bones.names)],
+        np.array([-1, *below_root, *alone]),
+        np.array([bones.heads[0], *bones.heads, *bones.heads]),
+    )
+
+
+TWICE = [("FK_", "DEF_"), ("DEF-", "FK-"), ("rig:FK ", "rig:DEF "), ("x.", "y.")]
+
+
+@pytest.mark.parametrize("scheme", ["nameless", "unreal"])
+@pytest.mark.parametrize(("first", "second"), TWICE)
+def test_all_bones_of_a_rig_that_has_them_twice_are_of_one_person(
+    scheme: str, first: str, second: str
+) -> None:
+    bones, part_of = bones_of(scheme, drop=0.8)
+    found = guess(doubled(bones, first, second)).parts
+    persons = [{prefix + bone: part_of[bone] for bone in part_of} for prefix in (first, second)]
+    assert found == persons["FK" in second]
+
+
+@pytest.mark.parametrize("scheme", ["nameless", "unreal"])
+@pytest.mark.parametrize(("first", "second"), TWICE)
+def test_bones_that_constraints_turn_are_left_out_where_there_are_others(
+    scheme: str, first: str, second: str
+) -> None:
+    bones, part_of = bones_of(scheme, drop=0.8)
+    rest = doubled(bones, first, second)
+    for held, free in ((first, second), (second, first)):
+        found = guess(rest, held={held + bone for bone in part_of})
+        assert found.parts == {free + bone: part for bone, part in part_of.items()}
+
+
+@pytest.mark.parametrize("limb", ["elbow", "knee", ""])
+@pytest.mark.parametrize("scheme", ["nameless", "unreal"])
+def test_bones_that_constraints_turn_are_taken_where_there_are_no_others(
+    scheme: str, limb: str
+) -> None:
+    """Bones of IK, or all of them."""
+    bones, part_of = bones_of(scheme)
+    held = {bone for bone, part in part_of.items() if part.endswith(limb)}
+    assert guess(bones, held=held).parts == part_of
