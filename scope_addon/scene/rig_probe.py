@@ -10,12 +10,12 @@ Its rest pose is read as well: its bones, and the skin that each of them moves.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 
 import bpy
 import numpy as np
-from bpy.types import FCurve, Object
+from bpy.types import Constraint, FCurve, Object, PoseBone
 from mathutils import Matrix, Quaternion
 
 from ...solver.errors import InputError
@@ -39,6 +39,7 @@ _CARRIER_TOLERANCE = 0.02
 # change of a rotation matrix's entries; the probe changes them by more than 0.3
 _MIN_RESPONSE = 0.1
 _MAX_CHECKED_FRAMES = 10
+_SAME_PLACE = 0.002  # of the ends of two bones, as a share of the rig's size
 _MAX_DEVIATION = np.radians(20)
 _MAX_SHIFT = 0.05  # of the root bone's head from where it should be, as a share of the rig's size
 _VISIBLE = 1e-3  # of a bone's pose: radians, factors and shares of its length
@@ -52,6 +53,13 @@ _AT_REST = {
 }
 # The part that carries each part of a limb; hips and shoulders move with the pelvis.
 _CARRIED_BY = {"knee": "hip", "ankle": "knee", "elbow": "shoulder", "wrist": "elbow"}
+# Constraints that hold a chain of bones, and all after which a bone does not turn as it is posed.
+_CHAINED = ("IK", "SPLINE_IK")
+_TURNING = (
+    *("ACTION", "COPY_ROTATION", "COPY_TRANSFORMS", "DAMPED_TRACK", "LOCKED_TRACK", "STRETCH_TO"),
+    *("TRACK_TO", "TRANSFORM", *_CHAINED),
+)
+_UNKNOWN = "the constraint or driver that controls the bone"
 # Of the lowest bone from the rig's origin, as a share of the rig's size.
 _MAX_LIFT = 0.17
 
@@ -96,6 +104,40 @@ def probe(rig: Object, parts: dict[str, str]) -> Skeleton:
     )
 
 
+def held_bones(rig: Object) -> set[str]:
+    """Return the bones that constraints turn: they do not turn as they are posed."""
+    return {
+        name
+        for _, constraint, chain in _acting(rig)
+        if constraint.type in _TURNING and getattr(constraint, "mix_mode", "REPLACE") == "REPLACE"
+        for name in chain
+    }
+
+
+def _acting(rig: Object) -> Iterator[tuple[PoseBone, Constraint, list[str]]]:
+    """Yield the constraints of bones that are not muted, each with the names of the bones that it
+    controls: with IK, they may be several.
+    """
+    for bone in rig.pose.bones:
+        for constraint in bone.constraints:
+            if constraint.is_valid and not constraint.mute and constraint.influence > 0.0:
+                count = constraint.chain_count if constraint.type in _CHAINED else 1
+                chain = [bone, *bone.parent_recursive][: count or None]
+                yield bone, constraint, [each.name for each in chain]
+
+
+def _controlling(rig: Object, names: Iterable[str]) -> str:
+    """Return the constraints that control bones, in words; empty without any."""
+    wanted = set(names)
+    found = [
+        f"'{constraint.name}' of '{bone.name}'"
+        for bone, constraint, chain in _acting(rig)
+        if wanted.intersection(chain)
+    ]
+    several = "s" if len(found) > 1 else ""
+    return f"the constraint{several} {' and '.join(found)}" if found else ""
+
+
 def _check_carried(
     rig: Object, names: list[str], carriers: IndexArray, parts: dict[str, str]
 ) -> None:
@@ -114,10 +156,16 @@ def _check_carried(
         while carrying >= 0 and carrying != bone_of[above]:
             carrying = int(carriers[carrying])
         if carrying < 0:
+            lower = rig.data.bones[names[bone]]
+            upper = names[bone_of[above]]
+            chain = [lower.name, *(each.name for each in lower.parent_recursive)]
+            between = chain[: chain.index(upper)] if upper in chain else chain[:1]
+            held = _controlling(rig, [*between, upper]) or _controlling(rig, chain)
+            parts_in_words = f"{part} and {above}".replace("_", " ")
+            reason = f": mute {held}, or" if held else f", so they cannot be {parts_in_words};"
             raise InputError(
-                f"'{names[bone]}' of '{rig.name}' does not move with '{names[bone_of[above]]}', so "
-                f"they cannot be {part.replace('_', ' ')} and {above.replace('_', ' ')}; choose "
-                "other bones in the bone map"
+                f"'{lower.name}' of '{rig.name}' does not move with '{upper}'{reason} choose other "
+                "bones in the bone map"
             )
 
 
@@ -212,8 +260,8 @@ def _check_rotated(rig: Object, names: list[str], turned: Float64Array) -> None:
     if blocked:
         raise InputError(
             f"'{blocked[0]}' of '{rig.name}' does not move when it is rotated: show the rig in the "
-            "viewport, mute the "
-            "constraint or driver that controls the bone, or remove it from the list"
+            f"viewport, mute {_controlling(rig, blocked[:1]) or _UNKNOWN}, or remove it from the "
+            "list"
         )
 
 
@@ -238,9 +286,8 @@ def _check_root_moves(rig: Object, name: str) -> None:
             "Mode, disconnect the bone (Alt P)"
         )
     raise InputError(
-        f"'{name}' of '{rig.name}' does not move when its location changes: mute the constraint or "
-        "driver that "
-        "controls the bone, or choose another one for the pelvis in the list"
+        f"'{name}' of '{rig.name}' does not move when its location changes: mute "
+        f"{_controlling(rig, [name]) or _UNKNOWN}, or choose another one for the pelvis in the list"
     )
 
 
@@ -248,7 +295,7 @@ def blocked_bones(
     rig: Object, keys: Sequence[BoneMotion], wanted: Float64Array, heads: Float64Array
 ) -> list[Notice]:
     """Return warnings about bones that deviate from the motion although they can be moved, such as
-    a leg with IK.
+    a leg with IK, and about those that should follow them and carry the skin.
 
     :param keys: of the B bones; only the root bone has locations.
     :param wanted: (T, B, 3, 3) bone to world.
@@ -256,21 +303,40 @@ def blocked_bones(
     """
     names = [key.bone for key in keys]
     root = next(b for b, key in enumerate(keys) if key.locations is not None)
+    twins = _twins(rig, names)
+    followed = list(twins.values())
+    names += twins
+    rested = np.array([rig.data.bones[name].matrix_local.to_3x3() for name in names], float)
+    R_bone_twin = transposed(rested[followed]) @ rested[len(keys) :]
     off = np.zeros(len(names))
     shift = 0.0
     for t in _farthest_frames(keys, heads - heads[0]):
         for key in keys:
             rig.pose.bones[key.bone].matrix_basis = basis_of(key, t)
         seen = _matrices(rig, names)
-        cosine = (np.einsum("bij,bij->b", unscaled(seen[:, :3, :3]), wanted[t]) - 1) / 2
+        expected = np.concatenate([wanted[t], wanted[t, followed] @ R_bone_twin])
+        cosine = (np.einsum("bij,bij->b", unscaled(seen[:, :3, :3]), expected) - 1) / 2
         off = np.maximum(off, np.arccos(np.clip(cosine, -1, 1)))
         size = np.ptp(seen[:, :3, 3], axis=0).max()
         shift = max(shift, np.linalg.norm(seen[root, :3, 3] - heads[t]) / size)
     is_blocked = off > _MAX_DEVIATION
     is_blocked[root] |= shift > _MAX_SHIFT
-    is_blocked |= np.array([_is_driven(rig, key) for key in keys])
+    is_blocked[: len(keys)] |= np.array([_is_driven(rig, key) for key in keys])
     blocked = [name for name, blocks in zip(names, is_blocked, strict=True) if blocks]
     return [notice("blocked_bones", bones=blocked, rig=rig.name)] if blocked else []
+
+
+def _twins(rig: Object, names: Sequence[str]) -> dict[str, int]:
+    """Return the other bones that move skin and are where a bone is at rest, with its row."""
+    bones = rig.data.bones
+    places = np.array([[*bones[name].head_local, *bones[name].tail_local] for name in names])
+    twins = {}
+    for bone in bones:
+        if bone.use_deform and bone.name not in names:
+            off = np.abs(places - [*bone.head_local, *bone.tail_local]).max(axis=1)
+            if off.min() < _SAME_PLACE * np.ptp(places):
+                twins[bone.name] = int(off.argmin())
+    return twins
 
 
 def _is_driven(rig: Object, key: BoneMotion) -> bool:
@@ -311,7 +377,7 @@ def posed_bones(rig: Object, names: Sequence[str]) -> list[Notice]:
     return [notice("posed_bones", bones=moving, rig=rig.name)] if moving else []
 
 
-def _is_posed(bone: bpy.types.PoseBone) -> bool:
+def _is_posed(bone: PoseBone) -> bool:
     """Return whether a bone is moved, turned or scaled, visibly."""
     offset = np.array(bone.matrix_basis, float) - np.eye(4)
     offset[:3, 3] /= bone.length

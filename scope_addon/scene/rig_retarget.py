@@ -49,9 +49,17 @@ from .rig_action import (
     root_locations,
     write_action,
 )
-from .rig_probe import at_rest, blocked_bones, posed_bones, probe, rest_pose, skin_unmodified
+from .rig_probe import (
+    at_rest,
+    blocked_bones,
+    held_bones,
+    posed_bones,
+    probe,
+    rest_pose,
+    skin_unmodified,
+)
 from .rigify_ik import ik_keys
-from .timing import current_frame_kept, show_frame
+from .timing import current_frame_kept, show_frame, stretched_time_notices
 from .transaction import all_or_nothing
 from .visibility import evaluated, world_matrix
 
@@ -116,7 +124,8 @@ def guess_bone_map(rig: Object) -> BoneMap:
 
     :raises InputError: when the rig has no bones.
     """
-    return guess(rest_pose(rig), is_mirrored=rig.matrix_world.determinant() < 0.0)
+    is_mirrored = rig.matrix_world.determinant() < 0.0
+    return guess(rest_pose(rig), is_mirrored=is_mirrored, held=held_bones(rig))
 
 
 def usable_guess(rig: Object) -> BoneMap:
@@ -239,6 +248,7 @@ def retarget(
             warnings += blocked_bones(rig, keys, motion.rotations, motion.heads)
             keys += ik_keys(rig, keys)
         warnings += posed_bones(rig, skeleton.names)
+        warnings += stretched_time_notices(bpy.context.scene)
         former = action_of(rig)
         action = write_action(rig, keys, frames, source.name)
         if face is not None:

@@ -45,6 +45,13 @@ def test_limbs_point_where_the_body_points(source, scheme, feet):
         assert direction_error(rig, bone_of, LEGS, JOINTS) < 1.0
 
 
+def test_a_scene_that_stretches_time_gives_a_warning(source):
+    rig, _ = build_rig("mixamo")
+    bpy.context.scene.render.frame_map_old = 50
+    (warning,) = run(source, rig).warnings
+    assert "at 0.5 times its speed" in str(warning)
+
+
 def _in_edit_mode(rig):
     bpy.context.view_layer.objects.active = rig
     bpy.ops.object.mode_set(mode="EDIT")
@@ -316,8 +323,72 @@ def test_a_pelvis_that_cannot_be_moved_is_reported(source):
     constraint = rig.pose.bones["pelvis"].constraints.new("COPY_LOCATION")
     constraint.target = rig
     constraint.subtarget = "root"
-    with pytest.raises(InputError, match="'pelvis' of 'unreal' does not move"):
+    with pytest.raises(InputError, match="does not move when .*: mute the constraint 'Copy Loc"):
         run(source, rig)
+
+
+@pytest.mark.parametrize("influence", [0.5, 1.0])
+@pytest.mark.parametrize(("owner", "end"), [("left_knee", "ankle"), ("right_elbow", "wrist")])
+def test_an_ik_constraint_that_holds_a_limb_and_what_carries_it_is_named(
+    source, influence, owner, end
+):
+    """Its goal is where the limb ends at rest."""
+    rig, bone_of = build_rig("unreal")
+    target = added_empty("target")
+    hand = rig.data.bones[bone_of[f"{owner.partition('_')[0]}_{end}"]]
+    target.location = rig.matrix_world @ hand.head_local
+    constraint = rig.pose.bones[bone_of[owner]].constraints.new("IK")
+    constraint.target = target
+    constraint.chain_count = 3
+    constraint.influence = influence
+    bpy.context.view_layer.update()
+    with pytest.raises(InputError, match=f"mute the constraint 'IK' of '{bone_of[owner]}'"):
+        run(source, rig)
+    constraint.mute = True
+    assert run(source, rig).warnings == []
+
+
+def with_deform_bones(rig):
+    """Give each bone a copy that alone moves skin and follows it, in a hierarchy of their own."""
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    bones = rig.data.edit_bones
+    names = bones.keys()
+    for name in names:
+        copy = bones.new(f"DEF_{name}")
+        (copy.head, copy.tail, copy.roll) = (bones[name].head, bones[name].tail, bones[name].roll)
+    for name in names:
+        if bones[name].parent is not None:
+            bones[f"DEF_{name}"].parent = bones[f"DEF_{bones[name].parent.name}"]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for name in names:
+        rig.data.bones[name].use_deform = False
+        constraint = rig.pose.bones[f"DEF_{name}"].constraints.new("COPY_TRANSFORMS")
+        constraint.target = rig
+        constraint.subtarget = name
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize("scheme", ["unreal", "nameless"])
+def test_bones_that_follow_others_are_not_guessed_and_move_with_them(source, scheme):
+    rig, bone_of = build_rig(scheme)
+    with_deform_bones(rig)
+    assert guess_bone_map(rig).parts == {bone: part for part, bone in bone_of.items()}
+    codes = [warning.code for warning in run(source, rig).warnings]
+    assert codes == ["guessed_bones"] * (scheme == "nameless")
+    copies = {part: f"DEF_{bone}" for part, bone in bone_of.items()}
+    assert direction_error(rig, copies, ARMS, JOINTS) < 1.0
+
+
+def test_bones_that_carry_the_skin_and_do_not_follow_those_in_the_list_are_reported(source):
+    """As of a limb that a switch of the rig's own has turned to IK."""
+    rig, bone_of = build_rig("unreal")
+    with_deform_bones(rig)
+    thigh = rig.pose.bones[f"DEF_{bone_of['left_hip']}"]
+    thigh.constraints[0].subtarget = bone_of["pelvis"]
+    (warning,) = run(source, rig).warnings
+    assert warning.code == "blocked_bones"
+    assert warning.values["bones"] == [thigh.name]
 
 
 def test_bones_blocked_by_a_constraint_are_reported(source):
