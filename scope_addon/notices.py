@@ -169,6 +169,9 @@ SENTENCES = {
     "scene_unit": "the scene's unit is {unit_m:g} m, but the capture is in metres: scale the new "
     "objects by {scale:g}, or set Unit Scale to 1 in the scene's properties; exported files have "
     "the true size",
+    "time_stretched": "the scene plays everything at {speed:g} times its speed, also the motion, "
+    "as its output properties stretch time from {old} to {new}; set both to the same number for "
+    "the true speed",
     "scene_rate": "the scene keeps its {scene_rate:.5g} frames/s, the {what:phrase} has "
     "{rate:.5g}: keys lie between frames; Match Frame Rate changes the scene's rate and moves them",
     "scene_rate_multiple": "the scene keeps its {scene_rate:.5g} frames/s, the {what:phrase} has "

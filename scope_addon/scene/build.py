@@ -183,6 +183,7 @@ def _build(
     unit = scene.unit_settings.scale_length
     if abs(unit - 1.0) > 1e-6:
         warnings.append(notice("scene_unit", unit_m=unit, scale=1 / unit))
+    warnings += timing.stretched_time_notices(scene)
     if options.resolution == "set":
         camera.set_resolution(scene, collection)
     if options.active_camera and people[0].camera is not None:

@@ -21,6 +21,7 @@ from bpy.types import ID, Action, FCurve, NlaStrip, Object, Scene
 
 from ..arrays import Float64Array, FloatArray, IndexArray
 from ..errors import MotionFileError, UsageError
+from ..notices import Notice, notice
 from .datablocks import action_of
 from .stored_values import LAST_FRAME, RATE, RATES, stored_rate, stored_text
 
@@ -71,6 +72,13 @@ def set_scene_rate(scene: Scene, frames_per_second: float) -> None:
     :raises UsageError: when Blender cannot store the rate.
     """
     scene.render.fps, scene.render.fps_base = blender_rate(frames_per_second)
+
+
+def stretched_time_notices(scene: Scene) -> list[Notice]:
+    """Say that a scene plays its frames at another speed than that of its frame rate."""
+    old = scene.render.frame_map_old
+    new = scene.render.frame_map_new
+    return [] if old == new else [notice("time_stretched", speed=old / new, old=old, new=new)]
 
 
 def rows_of_scene_frames(frames: Float64Array) -> tuple[Float64Array, IndexArray]:

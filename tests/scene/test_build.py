@@ -158,6 +158,20 @@ def test_a_scene_in_centimetres_gives_a_warning(body, make_motion):
     assert built.people[0].camera.data.clip_end >= 100_000.0  # a kilometre
 
 
+def test_a_scene_that_stretches_time_gives_a_warning(body, make_motion, truth, blender):
+    scene = bpy.context.scene
+    scene.render.frame_map_old = 100
+    scene.render.frame_map_new = 200
+    motion = make_motion(body, 30)
+    built = build_scene([motion], body, options=BuildOptions(frame_rate="set"))
+    (warning,) = built.warnings
+    assert "at 0.5 times its speed" in str(warning)
+    # Blender shows the pose of frame 10 at frame 20.
+    blender.go_to(20)
+    joints = blender.joints(built.people[0].armature, body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[10], atol=1e-5)
+
+
 def test_one_collection_and_one_camera_for_the_people_of_a_capture(
     body, make_motion, truth, blender
 ):
