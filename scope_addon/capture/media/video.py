@@ -122,7 +122,8 @@ class Video:
         if self.wanted.end_s < last / rate:
             last = math.floor((self.wanted.end_s + _SAME_S) * rate)
         steps = (last - first) * float(self._expected_rate) / rate
-        return max(1, math.floor(steps + 0.5) + 1)
+        # As `FrameSampler` does: no frame half a step before a sample's time is it.
+        return max(1, math.ceil(steps - 0.5 - _SAME_S) + 1)
 
     @property
     def length_s(self) -> float:

@@ -23,6 +23,7 @@ from ...errors import UsageError
 from ...footage_view import AS_IN_FILE, FootageView
 from .frame import Frame
 
+_SAME_S = 1e-6  # by which times of frames are rounded
 _MARGIN = Fraction(1, 4)  # of a frame, for containers that round the times of their frames
 _CLOCK = re.compile(r"(?:(?:(\d{1,4}):)?(\d{1,2}):)?(\d{1,9}(?:[.,]\d*)?|(?<!:)[.,]\d+)", re.A)
 _FRAMES = re.compile(r"(\d{1,4})([:;])(\d\d)([:;])(\d\d)([:;])(\d{2,3})", re.A)
@@ -135,7 +136,7 @@ class FrameSampler:
         """Yield the last frame, if it is less than half a step before the next sample's time."""
         if self._waiting is not None and self._fps is not None and self._start is not None:
             due = self._start + float(self._next / self._fps)
-            if due - self._waiting.timestamp_s < 0.5 / float(self._fps):
+            if due - self._waiting.timestamp_s < 0.5 / float(self._fps) - _SAME_S:
                 yield self._waiting
             self._waiting = None
 

@@ -7,6 +7,7 @@ standard.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -75,6 +76,20 @@ def test_resampled(long_video: Path) -> None:
         assert video.fps == FPS
         assert [f.index for f in video] == list(range(25, 51))
         assert "60" in str(video.warnings[0])
+
+
+@pytest.mark.parametrize("fps", [Fraction(25, 2), Fraction(25, 4), 10, 5])
+@pytest.mark.parametrize("start_s", [0.0, 1.0, 7.0])
+def test_as_many_frames_are_expected_as_sampled(
+    long_video: Path, fps: Fraction, start_s: float
+) -> None:
+    """Also where the last frame is as near to the last sample as to the next, which is none."""
+    for last in range(1, 9):
+        wanted = VideoRange(start_s, start_s + last / FPS, Fraction(fps))
+        with open_video(long_video, wanted) as video:
+            frames = len(list(video))
+            steps = Fraction(last) * fps / FPS
+            assert video.expected_frames == frames == math.ceil(steps - Fraction(1, 2)) + 1
 
 
 @pytest.mark.parametrize(("fps", "even"), [(10, 12.5), (20, 25), (24, 25), ("25/2", 0), (25, 0)])
