@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Float64Array
 from ..options.live import MAX_PEOPLE
 from .process import (
     CAPTURE_FIELDS,
@@ -41,9 +41,9 @@ class ShownPose:
     frame: int
     presence: str  # one of `PRESENCES`
     # (K+1, 4) w, x, y, z: the pelvis relative to the world, the others to their parents
-    rotations: NDArray[np.float64]
-    pelvis: NDArray[np.float64]  # (3,) metres, world
-    betas: NDArray[np.float64]  # (P,)
+    rotations: Float64Array
+    pelvis: Float64Array  # (3,) metres, world
+    betas: Float64Array  # (P,)
 
 
 class LiveProcess(WorkerProcess):

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
+from ..arrays import BoolArray, Float64Array
 from ..atomic_write import write_result
 from ..capture.media.video_range import FootageRange
 from ..capture_report import Report
@@ -206,7 +207,7 @@ def over_time(motions: Sequence[Motion], marked: Sequence[MarkedSpan] = ()) -> l
     return figures
 
 
-def face_rows(motion: Motion) -> list[tuple[str, NDArray[np.float64]]]:
+def face_rows(motion: Motion) -> list[tuple[str, Float64Array]]:
     """Return the shares of a face over time: name and values (T,) from 0 to 1."""
     names = motion.face["expression_names"].tolist()
     weights = motion.face["expressions"].astype(float)
@@ -242,7 +243,7 @@ def marked_spans(
     return marked
 
 
-def time_axis(times: NDArray[np.float64]) -> Axis:
+def time_axis(times: Float64Array) -> Axis:
     """Return the axis of frames at times (T,), in seconds."""
     first = float(times[0])
     last = float(times[-1])
@@ -305,9 +306,7 @@ def _review(motion: Motion, body: Body) -> list[Span]:
     return find_review_spans(motion, _GAP_S, under_floor(motion, body))
 
 
-def _marked(
-    span: Span, times: NDArray[np.float64], person: int, motions: Sequence[Motion]
-) -> MarkedSpan:
+def _marked(span: Span, times: Float64Array, person: int, motions: Sequence[Motion]) -> MarkedSpan:
     who = f"{_name(person, motions)}: " if len(motions) > 1 else ""
     return MarkedSpan(
         float(times[span.first]), float(times[span.last]), span.reason, who + REASONS[span.reason]
@@ -361,9 +360,7 @@ def height_text(height_m: float, sigma_m: float) -> str:
     return f"{100 * height_m:.{digits}f} ± {100 * sigma_m:.{digits}f} cm"
 
 
-def highest_speed(
-    points: NDArray[np.float64], times: NDArray[np.float64], seen: NDArray[np.bool_]
-) -> float:
+def highest_speed(points: Float64Array, times: Float64Array, seen: BoolArray) -> float:
     """Return the highest mean speed of points (T, 2) at times (T,) over half a second in which all
     were seen (T,), or over the longest part of less.
     """

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
+from ..arrays import Uint8Array
 from ..capture.fitting.outline import spread
 from ..capture.media.video_range import FootageRange
 from ..capture.overlay_video import painted_frames
@@ -273,7 +274,7 @@ def overlay_pictures(
     return bounded(pictures, MAX_BYTES)
 
 
-def small_picture(row: int, image: NDArray[np.uint8], longest_side: int = LONGEST_SIDE) -> Picture:
+def small_picture(row: int, image: Uint8Array, longest_side: int = LONGEST_SIDE) -> Picture:
     """Return an RGB image, (H, W, 3) uint8, as a WebP picture of at most ``longest_side`` pixels.
 
     :raises OutputError: OpenCV cannot write WebP.

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
+from ..arrays import Float64Array, Uint8Array
 from ..motion import Motion
 
 MAX_BYTES = 4_500_000  # of all people over time; of longer clips, every n-th frame is shown
@@ -93,8 +94,8 @@ def encoded(array: NDArray[Any]) -> str:
 
 
 def quantized_positions(
-    points: NDArray[np.float64],
-) -> tuple[NDArray[np.uint16], NDArray[np.float64], NDArray[np.float64]]:
+    points: Float64Array,
+) -> tuple[NDArray[np.uint16], Float64Array, Float64Array]:
     """Return (V, 3) integers n, and low (3,) and step (3,), so that the points (V, 3) are low +
     step · n.
     """
@@ -103,7 +104,7 @@ def quantized_positions(
     return np.round((points - low) / step).astype(np.uint16), low, step
 
 
-def quantized_weights(weights: NDArray[np.float64]) -> NDArray[np.uint8]:
+def quantized_weights(weights: Float64Array) -> Uint8Array:
     """Return weights (V, 4), each row of which has the sum 1, as integers (V, 4) with the sum
     255.
     """
@@ -113,7 +114,7 @@ def quantized_weights(weights: NDArray[np.float64]) -> NDArray[np.uint8]:
     return integers.astype(np.uint8)
 
 
-def quantized_rotations(poses: NDArray[np.float64]) -> NDArray[np.int16]:
+def quantized_rotations(poses: Float64Array) -> NDArray[np.int16]:
     """Return axis-angle vectors (T, K+1, 3) as unit quaternions (T, K+1, 4), w first and not
     negative, times 32767.
     """
