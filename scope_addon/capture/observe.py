@@ -27,7 +27,7 @@ from .camera.given_path import GivenPath, read_camera_path
 from .camera.intrinsics import Camera, choose_camera
 from .camera.line_segments import Lines
 from .camera.zoom import Zoom
-from .fitting.focal_length import BackgroundEstimators, FocalFits
+from .fitting.focal_length import BackgroundEstimators
 from .fitting.live_body import LiveBody
 from .frame_observer import FrameObserver, Observed, Trackers
 from .media.frame import Frame
@@ -178,9 +178,7 @@ def observe(
         options.part.check(video.width, video.height)
     live = LiveBody(body, camera, next(iter(options.heights_m), None))
     with (
-        BackgroundEstimators(
-            camera, video.width, video.height, live, FocalFits(body)
-        ) as background,
+        BackgroundEstimators(camera, video.width, video.height, live) as background,
         opencv_in_one_thread(),
     ):
         job = ObservationJob(video, options, clock, progress, watch, camera, live, background)
@@ -234,8 +232,7 @@ def observe_in_one_pass(job: ObservationJob, memory: EstimateMemory | None = Non
     for done, (frame, upcoming) in enumerate(frame_pairs(iter(video), job.clock), start=1):
         people = observer.add(frame, upcoming)
         with job.clock.stage("background"):
-            largest = people[0] if people else None
-            job.background.add(frame.timestamp_s, largest, observer.background)
+            job.background.use_edges(observer.background)
         job.watch(frame, people, job.live)
         job.progress(FINDING, done, max(expected, done))
     return observer.observed(execution.describe(threads), execution.warnings + video.warnings)

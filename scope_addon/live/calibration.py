@@ -15,10 +15,10 @@ import numpy as np
 from ...solver import Body
 from ..arrays import Float64Array, FloatArray, Uint8Array
 from ..capture.camera.bars import find_bars, longer_content_side
-from ..capture.camera.intrinsics import Camera, assumed_camera
+from ..capture.camera.intrinsics import Camera
 from ..capture.camera.line_segments import Segments, find_segments
 from ..capture.camera.verticals import estimate_up_from_lines
-from ..capture.fitting.focal_length import FocalFits, camera_by_edges, camera_by_fits
+from ..capture.fitting.focal_length import camera_by_edges
 from ..capture.fitting.frame_sequence import FittedTrack
 from ..capture.fitting.prepared_track import prepare_track
 from ..capture.fitting.track_fit import fit_track
@@ -126,10 +126,7 @@ class Calibrator:
         self._given = camera
         self._size = size
         self._height_m = height_m
-        self._fits = FocalFits(body)
-        self._costs: list[Float64Array] = []
-        self._longer_px = float(max(size))
-        self._by_edges = camera
+        self._camera = camera
         self._segments = Segments.none()
         self._up_of_lines: Float64Array | None = None
         self._focal_of_lines = 1e-9  # for which that was estimated
@@ -140,24 +137,14 @@ class Calibrator:
         bars = find_bars(image_rgb)
         self._segments = find_segments(image_rgb, people, bars=bars)
         if self._given.focal_deviation > 0.0:
-            self._longer_px = longer_content_side(bars, *self._size)
-            self._by_edges = camera_by_edges(self._segments, *self._size, self._longer_px)
+            longer_px = longer_content_side(bars, *self._size)
+            self._camera = camera_by_edges(self._segments, *self._size, longer_px)
 
     def estimate(
         self, times_s: Sequence[float], observations: Sequence[Observation]
     ) -> LiveCalibration:
         """Estimate everything from all observations so far, at least one."""
-        if self._given.focal_deviation > 0.0:
-            assumed = assumed_camera(*self._size, self._longer_px)
-            for time_s, observation in zip(times_s, observations, strict=True):
-                if (
-                    self._fits.is_due(time_s)
-                    and (costs := self._fits.costs(observation, assumed)) is not None
-                ):
-                    self._costs.append(costs)
-            camera = camera_by_fits(self._by_edges, assumed, self._costs, self._longer_px)
-        else:
-            camera = self._given
+        camera = self._camera
         track = track_of(times_s, observations)
         prepared = prepare_track(self._body, track, camera, height_m=self._height_m)
         fitted = fit_track(prepared, lambda *_: None)

@@ -42,7 +42,7 @@ from ..perception.region import Region
 from ..perception.sessions import Execution
 from .kept_estimates import KeptEstimates
 from .window_file import KeptWindows, load_window, save_window
-from .windows import JoinedWindows, largest_people, plan_windows
+from .windows import JoinedWindows, plan_windows
 
 # Called when a window has ended, with its run and that of the next window; returns the run to go on
 # with.
@@ -121,12 +121,7 @@ class WindowedClip:
             raise no_frames_error(self._video)
         execution = self._execution.describe(self._threads) if self._trackers else ""
         warnings = self._execution.warnings + self._video.warnings
-        observed = self._joined.observed(execution, warnings)
-        edge_frames = observed.background.edge_frames
-        if edge_frames:
-            for time_s, largest in largest_people(observed, edge_frames[0].row):
-                job.background.add(time_s, largest, observed.background)
-        return observed
+        return self._joined.observed(execution, warnings)
 
     def save(self, numbers: range, folder: Path, progress: Progress) -> tuple[list[Path], int]:
         """Observe some successive windows, and write each to a file of a folder.

@@ -11,7 +11,6 @@ common frames, with keypoints in the same places over the last of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from ...notices import Notice
 from ..camera.background_record import joined_backgrounds
 from ..frame_observer import Observed, Window
 from ..media.video import Video
-from ..perception.observation import Observation
 from ..perception.region import Region
 from ..tracking.people import cheapest_links
 from ..tracking.track import Tracklet, trunk_px
@@ -48,7 +46,6 @@ def plan_windows(video: Video, window_s: float) -> list[Window]:
     return [Window(k, *times) for k, times in enumerate(zip(anchors, begins, ends, strict=True))]
 
 
-_NOWHERE = Region((0.0, 0.0), 1.0, 0.0)
 # Two tracklets whose keypoints are closer in the mean, in sides of the region, are one person.
 SAME_PERSON = 0.15
 COMPARED_FRAMES = 10
@@ -154,25 +151,6 @@ class JoinedWindows:
             joined.values[behind + k] = value
             joined.centers_px[behind + k] = trunk_px(value[:, :2])
         joined.extend(own)
-
-
-def largest_people(observed: Observed, first_row: int) -> Iterator[tuple[float, Observation]]:
-    """Yield the time and the largest person of each frame from a row on in which somebody was seen.
-
-    The observations contain what a fit of their frames needs.
-    """
-    largest: dict[int, tuple[float, Tracklet, int]] = {}
-    for tracklet in observed.tracklets.values():
-        for k, (row, side_px) in enumerate(zip(tracklet.rows, tracklet.sides_px, strict=True)):
-            if row >= first_row and (row not in largest or side_px > largest[row][0]):
-                largest[row] = side_px, tracklet, k
-    for row in sorted(largest):
-        _, tracklet, k = largest[row]
-        px, confidence, world = np.split(tracklet.values[k].astype(float), (2, 3), axis=1)
-        yield (
-            observed.timestamps[row],
-            Observation(px, confidence[:, 0], world, 1.0, _NOWHERE, acquired=True),
-        )
 
 
 def same_people(before: Observed, after: Observed) -> dict[int, int]:

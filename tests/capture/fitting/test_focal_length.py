@@ -13,19 +13,15 @@ import json
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.camera.intrinsics import assumed_camera, choose_camera, pinhole
+from scope.scope_addon.capture.camera.intrinsics import choose_camera, pinhole
 from scope.scope_addon.capture.camera.line_segments import Segments, find_segments
 from scope.scope_addon.capture.camera.manhattan import Edges
 from scope.scope_addon.capture.fitting.focal_length import (
-    FocalFits,
-    camera_by_fits,
     focal_from_edges,
 )
-from scope.scope_addon.capture.perception.observation import Observation
-from scope.scope_addon.capture.perception.region import Region
 from scope.solver.rotations import exp
 
-from ..exact_tracks import centred, network_points, pixels_of
+from ..exact_tracks import pixels_of
 
 WIDTH = 1280
 
@@ -137,103 +133,3 @@ def test_real_cameras(shared, number):
         assert estimate is None
     else:
         assert estimate[0] == pytest.approx(truth, rel=0.04)
-
-
-FITS_WIDTH = 1080
-
-
-FITS_HEIGHT = 1920
-
-
-FITS_ASSUMED = assumed_camera(FITS_WIDTH, FITS_HEIGHT, float(FITS_HEIGHT))
-ASSUMED_PX = FITS_ASSUMED.intrinsics[0, 0]
-
-
-POSES = [  # axis-angle of joints; arms and legs reach towards the camera and away from it
-    {
-        "left_hip": [-1.2, 0, 0],
-        "left_knee": [0.6, 0, 0],
-        "right_shoulder": [0, 1.2, 0],
-        "left_shoulder": [0, 0, -1.2],
-    },
-    {
-        "right_hip": [-0.8, 0, 0.3],
-        "left_hip": [0.5, 0, 0],
-        "left_shoulder": [0, -1.4, 0],
-        "spine1": [0.4, 0, 0],
-    },
-    {"left_shoulder": [0, 0.9, -0.5], "right_shoulder": [0, 1.4, 0.3], "right_hip": [0.7, 0, 0]},
-]
-
-
-def observe(body, joints, ratio: float, distance_m: float, pitch: float = 0.35) -> Observation:
-    """The body seen by a camera with ``ratio`` times the assumed focal length that looks down on
-    it.
-    """
-    rotations = np.tile(np.eye(3), (body.K + 1, 1, 1))
-    rotations[0] = exp([pitch, 0, 0]) @ np.diag([1.0, -1.0, -1.0])
-    for joint, vector in joints.items():
-        rotations[body.joint_names.index(joint)] = exp(np.array(vector, float))
-    pose = body.forward_kinematics(rotations, np.array([0, 0, distance_m]), np.zeros(body.P))
-    points = network_points(body, *pose)
-    pixels = pixels_of(points, pinhole(FITS_WIDTH, FITS_HEIGHT, ratio * ASSUMED_PX))
-    region = Region((FITS_WIDTH / 2, FITS_HEIGHT / 2), float(FITS_HEIGHT), 0.0)
-    return Observation(pixels, np.ones(len(points)), centred(points), 1.0, region, acquired=True)
-
-
-def found_by_fits(body, ratio: float, distance_m: float):
-    fits = FocalFits(body)
-    costs = []
-    for pose in POSES:
-        cost = fits.costs(observe(body, pose, ratio, distance_m), FITS_ASSUMED)
-        assert cost is not None
-        costs.append(cost)
-    return camera_by_fits(FITS_ASSUMED, FITS_ASSUMED, costs, float(FITS_HEIGHT))
-
-
-def test_a_nearby_person_determines_the_focal_length(body):
-    """At 1.3 m and half the focal length, a person is as large in the image as at 2.6 m and the
-    full one.
-    """
-    ratios = [0.6, 1.0, 1.6]
-    log_f = [
-        np.log(found_by_fits(body, ratio, 2.2 * ratio).intrinsics[0, 0] / ASSUMED_PX)
-        for ratio in ratios
-    ]
-    assert log_f[0] < log_f[1] - 0.1 < log_f[2] - 0.2
-    before = np.log(ratios)
-    after = np.log(ratios) - log_f
-    assert np.square(after).mean() < 0.7 * np.square(before).mean()
-
-
-def test_a_distant_person_does_not_change_the_focal_length(body):
-    camera = found_by_fits(body, 8.0, 60.0)
-    assert abs(np.log(camera.intrinsics[0, 0] / ASSUMED_PX)) < 0.15
-    assert 0.2 < camera.focal_deviation <= 0.25
-
-
-def test_a_more_certain_estimate_from_edges_weighs_more(body):
-    costs = [FocalFits(body).costs(observe(body, POSES[0], 0.6, 1.3), FITS_ASSUMED)]
-    sure = camera_by_fits(FITS_ASSUMED, FITS_ASSUMED, costs, float(FITS_HEIGHT))
-    by_edges = type(FITS_ASSUMED)(FITS_ASSUMED.intrinsics, FITS_ASSUMED.dist, "estimated", 0.03)
-    both = camera_by_fits(by_edges, FITS_ASSUMED, costs, float(FITS_HEIGHT))
-    assert sure.intrinsics[0, 0] < 0.95 * ASSUMED_PX
-    assert both.intrinsics[0, 0] == pytest.approx(ASSUMED_PX, rel=0.03)
-    assert both.focal_deviation == pytest.approx(0.03, rel=0.05)
-    assert camera_by_fits(by_edges, FITS_ASSUMED, [], float(FITS_HEIGHT)) is by_edges
-
-
-@pytest.mark.parametrize(
-    ("seconds", "least", "most"), [(0.01, 1, 1), (60.0, 7, 10), (3600.0, 13, 16)]
-)
-def test_an_hour_takes_few_more_fits_than_a_minute(body, seconds, least, most):
-    fits = FocalFits(body)
-    due = [k for k in range(int(30 * seconds) + 1) if fits.is_due(7.0 + k / 30)]
-    assert due[0] == 0
-    assert least <= len(due) <= most
-
-
-def test_an_observation_that_is_not_finite_has_no_costs(body):
-    observation = observe(body, POSES[0], 1.0, 3.0)
-    observation.keypoints_px[3] = np.nan
-    assert FocalFits(body).costs(observation, FITS_ASSUMED) is None

@@ -12,11 +12,7 @@ from scope.scope_addon.capture.camera.heading_drift import FrameEdges
 from scope.scope_addon.capture.camera.intrinsics import assumed_camera, choose_camera
 from scope.scope_addon.capture.camera.line_segments import Segments
 from scope.scope_addon.capture.fitting import focal_length
-from scope.scope_addon.capture.fitting.focal_length import (
-    LOG_RATIOS,
-    BackgroundEstimators,
-    FocalFits,
-)
+from scope.scope_addon.capture.fitting.focal_length import BackgroundEstimators
 
 
 class SlowBody:
@@ -41,69 +37,37 @@ def test_a_cancel_while_compiling_is_passed_on(monkeypatch):
 
     with (
         pytest.raises(KeyboardInterrupt),
-        BackgroundEstimators(assumed_camera(64, 48, 64.0), 64, 48, live, None) as background,
+        BackgroundEstimators(assumed_camera(64, 48, 64.0), 64, 48, live) as background,
     ):
         background.wait_for_solver(cancel)
 
 
-TIMES = np.arange(34) / 8.0
-SEEN = (TIMES >= 0.5) & ~((TIMES > 1.8) & (TIMES < 2.4))
-# after at least 0.2, 0.4, 0.8 and 1.6 s, where somebody is seen
-FITTED = [0.5, 0.75, 1.25, 2.5, 4.125]
-PEOPLE = [(time_s, SimpleNamespace(time_s=time_s)) for time_s in TIMES[SEEN].tolist()]
 BARS = [np.array([0.0, 0.0, 8.0, 48.0]), np.array([56.0, 0.0, 64.0, 48.0])]
-
-
-class RecordedFits(FocalFits):
-    """Fits that record the times of their frames, and prefer focal lengths that are longer by a
-    third.
-    """
-
-    def __init__(self):
-        super().__init__(None)
-        self.times = []
-        self.cameras = []
-
-    def costs(self, observation, camera):
-        self.times.append(observation.time_s)
-        self.cameras.append(camera)
-        return 50.0 * (LOG_RATIOS - 0.3) ** 2 * (1.0 + observation.time_s)
+FIRST_EDGES = 4  # frame in which the background is searched for edges first
 
 
 class Background:
-    """A background that is searched for edges in the first frame in which somebody is seen."""
+    """A background that is searched for edges in some frames."""
 
     def __init__(self):
         self.edge_frames = []
         self.bars = []
 
     def add(self, row):
-        if SEEN[row] and not self.edge_frames:
+        if row in (FIRST_EDGES, FIRST_EDGES + 3):
             self.bars = BARS
             self.edge_frames.append(FrameEdges(row, Segments.none()))
 
 
-def estimate(frames, replayed=(), lag=0, given=None):
-    """The camera, and the fits, if some frames are added one by one and some of `PEOPLE` at the
-    end.
-
-    :param lag: 1: the background of a frame is ready only when the next one is added.
-    """
-    fits, followed, live = RecordedFits(), Background(), SimpleNamespace(load=lambda: None)
-    largest = dict(PEOPLE)
-    with BackgroundEstimators(
-        given or assumed_camera(64, 48, 64.0), 64, 48, live, fits
-    ) as background:
-        for row in range(frames):
-            if row >= lag:
-                followed.add(row - lag)
-            background.add(TIMES[row], largest.get(TIMES[row]), followed)
-        for row in range(len(TIMES)):
+def estimate(frames, given=None):
+    """The camera, if its background is looked at in the first frames, and at the end."""
+    followed, live = Background(), SimpleNamespace(load=lambda: None)
+    with BackgroundEstimators(given or assumed_camera(64, 48, 64.0), 64, 48, live) as background:
+        for row in range(10):
             followed.add(row)
-        for time_s, person in replayed:
-            background.add(time_s, person, followed)
-        camera = background.camera(followed)
-    return camera, fits
+            if row < frames:
+                background.use_edges(followed)
+        return background.camera(followed)
 
 
 def test_an_error_in_a_parallel_thread_is_raised(monkeypatch):
@@ -112,29 +76,31 @@ def test_an_error_in_a_parallel_thread_is_raised(monkeypatch):
 
     monkeypatch.setattr(focal_length, "camera_by_edges", broken)
     with pytest.raises(ValueError, match="no edges today"):
-        estimate(len(TIMES))
+        estimate(10)
 
 
-def test_a_given_focal_length_is_not_estimated():
+def test_a_given_focal_length_is_not_estimated(monkeypatch):
+    monkeypatch.setattr(focal_length, "camera_by_edges", None)
     given = choose_camera(64, 48, fov_deg=40.0)
-    camera, fits = estimate(len(TIMES), given=given)
-    assert fits.times == []
+    camera = estimate(10, given)
     expected = given.between_bars(48.0, 64, 48)
     assert (camera.source, camera.focal_deviation) == (expected.source, 0.0)
     np.testing.assert_array_equal(camera.intrinsics, expected.intrinsics)
 
 
-@pytest.mark.parametrize(("frames", "lag"), [(len(TIMES), 0), (len(TIMES), 1), (17, 0), (3, 1)])
-def test_the_focal_length_is_the_same_from_frames_that_were_added_and_from_people_at_the_end(
-    frames, lag
+@pytest.mark.parametrize("frames", [0, FIRST_EDGES, 10])
+def test_the_focal_length_is_that_of_the_first_edges_whenever_these_are_looked_at(
+    monkeypatch, frames
 ):
-    alone, alone_fits = estimate(0, PEOPLE)
-    both, both_fits = estimate(frames, PEOPLE, lag)
-    assert alone_fits.times == FITTED
-    assert both_fits.times == alone_fits.times
-    np.testing.assert_array_equal(both.intrinsics, alone.intrinsics)
-    assert (both.focal_deviation, both.source) == (alone.focal_deviation, alone.source)
-    assumed = assumed_camera(64, 48, 48.0)  # of the picture between the bars
-    assert alone.intrinsics[0, 0] > 1.2 * assumed.intrinsics[0, 0]
-    for camera in alone_fits.cameras + both_fits.cameras:
-        np.testing.assert_array_equal(camera.intrinsics, assumed.intrinsics)
+    seen = []
+    by_edges = focal_length.camera_by_edges
+
+    def recorded(segments, *size):
+        seen.append((segments, size))
+        return by_edges(segments, *size)
+
+    monkeypatch.setattr(focal_length, "camera_by_edges", recorded)
+    camera = estimate(frames)
+    assert len(seen) == 1
+    assert seen[0][1] == (64, 48, 48.0)  # of the picture between the bars
+    np.testing.assert_array_equal(camera.intrinsics, assumed_camera(64, 48, 48.0).intrinsics)

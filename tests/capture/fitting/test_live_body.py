@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.fitting import focal_length
-from scope.scope_addon.capture.fitting.focal_length import FocalFits
 from scope.scope_addon.capture.fitting.live_body import LiveBody
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
@@ -58,7 +57,7 @@ def test_the_previews_body_covers_the_true_joints(watched):
 
 
 def test_the_result_depends_on_no_watcher_and_no_thread_s_speed(watched, body, monkeypatch):
-    """Nobody watches, and bodies, edges and fits for the focal length come late."""
+    """Nobody watches, and bodies and edges come late."""
 
     class Slow(LiveBody):
         def load(self):
@@ -66,29 +65,16 @@ def test_the_result_depends_on_no_watcher_and_no_thread_s_speed(watched, body, m
             super().load()
 
     by_edges = focal_length.camera_by_edges
-    costs = FocalFits.costs
 
     def slow_edges(*arguments):
         time.sleep(0.2)
         return by_edges(*arguments)
 
-    def slow_costs(*arguments):
-        time.sleep(0.1)
-        return costs(*arguments)
-
     monkeypatch.setattr("scope.scope_addon.capture.observe.LiveBody", Slow)
     monkeypatch.setattr(focal_length, "camera_by_edges", slow_edges)
-    monkeypatch.setattr(FocalFits, "costs", slow_costs)
     slowly = capture(SAMPLE, body, WANTED).motions[0]
     for name in ("poses", "trans", "betas", "joints_cam", "intrinsics"):
         np.testing.assert_array_equal(getattr(slowly, name), getattr(watched[0].motions[0], name))
-
-
-def test_the_estimated_focal_length_is_nearer_to_the_true_one_than_the_assumed(watched):
-    truth = np.load(SAMPLE.with_name("sample_truth.npz"))["intrinsics"][0, 0]
-    assumed = choose_camera(640, 362).intrinsics[0, 0]
-    estimate = watched[0].report.focal_px
-    assert abs(np.log(estimate / truth)) < abs(np.log(assumed / truth))
 
 
 @pytest.mark.parametrize("name", ["scope", "scope_h"])

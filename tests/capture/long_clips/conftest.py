@@ -14,8 +14,6 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture import observe as observe_module
-from scope.scope_addon.capture.camera.intrinsics import Camera
-from scope.scope_addon.capture.fitting.focal_length import FocalFits
 from scope.scope_addon.capture.frame_observer import FrameObserver
 from scope.scope_addon.capture.long_clips.windowed_clip import lasting
 from scope.scope_addon.capture.media.frame import Frame
@@ -23,7 +21,6 @@ from scope.scope_addon.capture.media.video import Video, open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.observe import observe
 from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.tracking import landmark_estimator
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.clock import StageClock
@@ -71,9 +68,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def windows_of(
-    monkeypatch: pytest.MonkeyPatch, folder: Path, fitted: list[Observation]
-) -> Callable[..., list[Track]]:
+def windows_of(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Callable[..., list[Track]]:
     """``windows_of(options, parts=None, unfinished=None, stop_at=inf)``: the tracks of the clip.
 
     They are joined from a folder of windows, or what is found is kept in a folder; cancelled at a
@@ -87,7 +82,6 @@ def windows_of(
     )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector(people))
     monkeypatch.setattr(observe_module, "LiveBody", lambda *_: SimpleNamespace(load=lambda: None))
-    monkeypatch.setattr(observe_module, "FocalFits", lambda _: RecordedFits(fitted))
 
     def observed(
         options: CaptureOptions,
@@ -99,7 +93,6 @@ def windows_of(
             if done >= stop_at:
                 raise CancelledError("cancelled")
 
-        fitted.clear()
         with open_video(folder, options.wanted) as video:
             return observe(
                 video,
@@ -112,23 +105,6 @@ def windows_of(
             )[1]
 
     return observed
-
-
-class RecordedFits(FocalFits):
-    """Keeps the observations that the focal length is estimated from, and fits nothing."""
-
-    def __init__(self, fitted: list[Observation]) -> None:
-        super().__init__(BODY)
-        self._fitted = fitted
-
-    def costs(self, observation: Observation, camera: Camera) -> None:
-        self._fitted.append(observation)
-
-
-@pytest.fixture
-def fitted() -> list[Observation]:
-    """The people that the focal length of the last clip was estimated from."""
-    return []
 
 
 @pytest.fixture(scope="package")

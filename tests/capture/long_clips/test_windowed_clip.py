@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +11,9 @@ import pytest
 from scope.scope_addon.capture.long_clips import windows
 from scope.scope_addon.capture.long_clips.windowed_clip import count_windows, observe_windows
 from scope.scope_addon.capture.media.frame import Frame
-from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.tracking.track import Track
 
-from .conftest import FRAMES, LARGE, SMALL, WINDOW_S, assert_same, frames_from, options
+from .conftest import FRAMES, SMALL, assert_same, frames_from, options
 
 
 def places(track: Track) -> np.ndarray:
@@ -53,26 +51,6 @@ def test_the_same_person_is_followed_across_a_seam_where_somebody_larger_stands(
     monkeypatch.setattr(windows, "missed_people", lambda before, after: False)
     (track,) = windows_of(options())
     assert not track.seen[31:37].any()  # what the rule prevents
-
-
-def test_the_focal_length_is_estimated_from_the_same_people_in_one_window_and_in_several(
-    windows_of: Callable[..., list[Track]], fitted: list[Observation]
-) -> None:
-    """The first one, and others after at least 0.2, 0.4, 0.8 and 1.6 seconds; of two people, the
-    larger one.
-    """
-    found = []
-    for window_s in (WINDOW_S, 60.0):
-        windows_of(replace(options(2), window_s=window_s))
-        found.append([person.keypoints_px[[23, 24]].mean(axis=0) for person in fitted])
-    # 0.4 s are seven frames here: six of them are less by a rounding error
-    people = {0: SMALL, 3: SMALL, 10: SMALL, 23: LARGE, 48: SMALL}
-    truth = [
-        who.place(t) + who.size_px * who.body(t)[[23, 24], :2].mean(axis=0)
-        for t, who in people.items()
-    ]
-    np.testing.assert_allclose(found[0], truth, atol=2.0)  # the trackers smooth
-    np.testing.assert_allclose(found[1], found[0], atol=0.01)
 
 
 def test_windows_that_are_missing_or_damaged_are_observed_by_the_process_that_joins(
