@@ -89,7 +89,7 @@ def calibrate(
     first = people[0][0]
     matches: list[Match | None] = [Match(CameraPlace.first(), 0.0, 0, Clock.GIVEN)]
     matches += [
-        _best_match(first, seen, (given[0], known), mean_lengths, tick)
+        _best_match(first, seen, given[0], known, mean_lengths, tick)
         for seen, known in zip(people[1:], given[1:], strict=True)
     ]
     used = [(v, match) for v, match in enumerate(matches) if match is not None]
@@ -112,7 +112,7 @@ class _Guess:
     """Who in another camera may be the first one's person, and what may be its clock."""
 
     number: int  # of the person
-    given: tuple[Given, Given]  # of both cameras
+    given: Given  # of the other camera
     offset_s: float
     clock: Clock
 
@@ -120,21 +120,20 @@ class _Guess:
 def _guesses(
     first: SeenPerson,
     people: Sequence[SeenPerson],
-    given: tuple[Given, Given],
+    given: Given,
     tick: Callable[[], None],
 ) -> list[_Guess]:
     """Return who another camera's people may be, and when."""
-    offset_s = given[1].offset_s
-    unknown = (given[0], given[1].without_clock)
+    offset_s = given.offset_s
     guesses = []
     for number, person in enumerate(people):
         if offset_s is not None:
-            clock = Clock.SOUND if given[1].offset_sigma_s > 0 else Clock.GIVEN
+            clock = Clock.SOUND if given.offset_sigma_s > 0 else Clock.GIVEN
             guesses.append(_Guess(number, given, offset_s, clock))
             if clock == Clock.GIVEN:
                 continue
         guesses += [
-            _Guess(number, unknown, likely_s, Clock.MOTION)
+            _Guess(number, given.without_clock, likely_s, Clock.MOTION)
             for likely_s in likely_offsets(first, person, tick)
         ]
     return guesses
@@ -143,18 +142,22 @@ def _guesses(
 def _best_match(
     first: SeenPerson,
     people: Sequence[SeenPerson],
-    given: tuple[Given, Given],
+    of_first: Given,
+    given: Given,
     mean_lengths: Float64Array,
     tick: Callable[[], None],
 ) -> Match | None:
     """Return another camera's place by the one of its people who is the first camera's person; None
     if nobody may be them.
+
+    :param of_first: what is known of the first camera. :param given: of the other one.
     """
     guesses = everything = _guesses(first, people, given, tick)
 
     def tried(guess: _Guess, frames: int, turns: Float64Array) -> Match | None:
         tick()
-        return _adjusted_pair(first, people[guess.number], guess, frames, turns, mean_lengths)
+        second = people[guess.number]
+        return _adjusted_pair(first, second, guess, of_first, frames, turns, mean_lengths)
 
     if len(guesses) > 1:
         roughly = [(tried(guess, _ROUGH_FRAMES, _TURNS[:1]), guess) for guess in guesses]
@@ -162,7 +165,7 @@ def _best_match(
         order = np.argsort(costs, kind="stable")[:_MOST_GUESSES]
         guesses = [guesses[k] for k in order if costs[k] < _ROUGHLY * min(costs)]
     pairs = [pair for guess in guesses if (pair := tried(guess, _PAIR_FRAMES, _TURNS)) is not None]
-    if given[1].T_camera_first is None:
+    if given.T_camera_first is None:
         # Whom a place would turn too far is somebody else.
         turned = [_turned_off(first, people[pair.number], pair.place) or 0.0 for pair in pairs]
         pairs = [pair for pair, off in zip(pairs, turned, strict=True) if off <= MOST_TURNED]
@@ -192,6 +195,7 @@ def _adjusted_pair(
     first: SeenPerson,
     second: SeenPerson,
     guess: _Guess,
+    of_first: Given,
     frames: int,
     turns: Float64Array,
     mean_lengths: Float64Array,
@@ -202,14 +206,20 @@ def _adjusted_pair(
     :param frames: how many both cameras are adjusted to.
     :param turns: of the places that adjustments start from, radians.
     """
-    drift = guess.given[1].drift
-    clock = CameraPlace(np.eye(3), np.zeros(3), offset_s=guess.offset_s, drift=drift)
+    known = guess.given
+    clock = CameraPlace(np.eye(3), np.zeros(3), offset_s=guess.offset_s, drift=known.drift)
     shared = _shared_times(first, second, clock, frames)
-    starts = _starts(first, second, shared, clock, guess.given[1].T_camera_first, turns)
+    starts = _starts(first, second, shared, clock, known.T_camera_first, turns)
     if not len(shared) or not starts:
         return None
     adjusted = [
-        adjust([first, second], [CameraPlace.first(), start], shared, guess.given, mean_lengths)
+        adjust(
+            [first, second],
+            [CameraPlace.first(), start],
+            shared,
+            [of_first, known],
+            mean_lengths,
+        )
         for start in starts
     ]
     best = min(adjusted, key=lambda bundle: bundle.cost)
