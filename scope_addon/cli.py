@@ -7,10 +7,10 @@ go to stderr; with ``--json``, stdout carries nothing but the report.
 
 from __future__ import annotations
 
-import argparse
 import os
 import shlex
 import sys
+from argparse import SUPPRESS, ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
@@ -88,7 +88,7 @@ SAMPLE = ASSETS / "sample" / "sample.mp4"
 PROGRAM = (sys.executable, "-m", str(__package__))
 
 
-class _Parser(argparse.ArgumentParser):
+class _Parser(ArgumentParser):
     def __init__(self, **settings: Any) -> None:
         """Take flags by their full names only: `with_bare_values` knows no others."""
         super().__init__(**{"allow_abbrev": False, **settings})
@@ -105,7 +105,7 @@ class _Parser(argparse.ArgumentParser):
         raise UsageError(f"{message} (see {self.prog} --help)")
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> ArgumentParser:
     """Build the whole argparse tree."""
     parser = _Parser(
         prog="scope", description="Markerless motion capture: video in, animated body out."
@@ -140,7 +140,7 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add_capture_files(capture: argparse.ArgumentParser) -> None:
+def _add_capture_files(capture: ArgumentParser) -> None:
     capture.add_argument(
         "video",
         nargs="?",
@@ -176,13 +176,13 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
         help="of several cameras, write what was found of them as a calibration: .toml",
     )
     # Passed by a batch to its processes.
-    capture.add_argument(STOP_WITH_STDIN, action="store_true", help=argparse.SUPPRESS)
-    capture.add_argument(SHOWN_COMMAND, default="", help=argparse.SUPPRESS)
-    capture.add_argument(FINISHED_FILE, type=Path, help=argparse.SUPPRESS)
+    capture.add_argument(STOP_WITH_STDIN, action="store_true", help=SUPPRESS)
+    capture.add_argument(SHOWN_COMMAND, default="", help=SUPPRESS)
+    capture.add_argument(FINISHED_FILE, type=Path, help=SUPPRESS)
     add_window_arguments(capture)
 
 
-def _add_batch_files(batch: argparse.ArgumentParser) -> None:
+def _add_batch_files(batch: ArgumentParser) -> None:
     batch.add_argument(
         "folder",
         type=folder_argument,
@@ -306,7 +306,7 @@ def _print_report(report: dict[str, Any], stdout: TextIO) -> None:
         ) from error
 
 
-def run_capture(args: argparse.Namespace) -> dict[str, Any]:
+def run_capture(args: Namespace) -> dict[str, Any]:
     """Run ``scope capture``: check the arguments, capture, write every output; return the report.
 
     :raises ScopeError: an argument is invalid, or the capture or an output failed.
@@ -357,7 +357,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     return report
 
 
-def _check_files(args: argparse.Namespace, video: Path, outputs: list[Path]) -> None:
+def _check_files(args: Namespace, video: Path, outputs: list[Path]) -> None:
     """Check that all results can be written, before anything is read.
 
     :raises ScopeError: one cannot.
@@ -378,7 +378,7 @@ def _check_files(args: argparse.Namespace, video: Path, outputs: list[Path]) -> 
 
 
 def _write_extras(
-    args: argparse.Namespace, clip: CapturedClip, footage: WatchedFootage, progress: ProgressBar
+    args: Namespace, clip: CapturedClip, footage: WatchedFootage, progress: ProgressBar
 ) -> list[Path]:
     """Write what was asked for besides the results, and return the paths.
 
@@ -407,7 +407,7 @@ def _write_extras(
     return [*filter(None, (args.save_calibration, args.overlay, args.report))]
 
 
-def run_batch(args: argparse.Namespace) -> dict[str, Any]:
+def run_batch(args: Namespace) -> dict[str, Any]:
     """Run ``scope batch``: capture each clip in its own process; return the report on all of them.
 
     :raises ScopeError: an argument is invalid, there is no footage, or the report cannot be

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,15 +32,15 @@ def path_argument(text: str) -> Path:
         the current folder; or an address.
     """
     if not text:
-        raise argparse.ArgumentTypeError("the path is empty; give a file or folder")
+        raise ArgumentTypeError("the path is empty; give a file or folder")
     if is_url(text):  # of which a path would lose a slash
-        raise argparse.ArgumentTypeError(
+        raise ArgumentTypeError(
             f"{text} is an address, and files are needed here; download it first"
         )
     return Path(text)
 
 
-def add_outputs(parser: argparse.ArgumentParser, default: str) -> None:
+def add_outputs(parser: ArgumentParser, default: str) -> None:
     """Add the argument for the files that a command writes.
 
     :param default: what it writes without one, for the help.
@@ -57,7 +57,7 @@ def add_outputs(parser: argparse.ArgumentParser, default: str) -> None:
     )
 
 
-def add_options(parser: argparse.ArgumentParser, place: Place = Place.COMMAND_LINE) -> None:
+def add_options(parser: ArgumentParser, place: Place = Place.COMMAND_LINE) -> None:
     """Add an argument for each option of the command line, or of one of its commands."""
     for option in options_at(place):
         if option.value_type is bool:
@@ -96,7 +96,7 @@ def with_bare_values(argv: Sequence[str]) -> list[str]:
     return [text for k, text in enumerate(out) if k not in joined]
 
 
-def _add_valued(parser: argparse.ArgumentParser, option: Option) -> None:
+def _add_valued(parser: ArgumentParser, option: Option) -> None:
     argument = option.argument
     default = _default(option)
     text = argument.default_text or (str(default) if default else "")
@@ -118,7 +118,7 @@ def _argument_type(option: Option) -> Callable[[str], Any]:
     return path_argument if option.value_type is Path else option.value_type
 
 
-def body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
+def body_and_options(args: Namespace) -> tuple[Body, CaptureOptions]:
     """Load the body and convert the arguments to the options of a capture.
 
     :raises ScopeError: an argument has an invalid value, or the body does not exist.
@@ -133,7 +133,7 @@ def body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
     return body, options
 
 
-def option_values(args: argparse.Namespace, place: Place = Place.COMMAND_LINE) -> dict[str, Any]:
+def option_values(args: Namespace, place: Place = Place.COMMAND_LINE) -> dict[str, Any]:
     """Return the value of each option of the command line, or of one of its commands, by the
     option's name.
 
@@ -142,7 +142,7 @@ def option_values(args: argparse.Namespace, place: Place = Place.COMMAND_LINE) -
     return {option.name: _value(option, _argument(option, args)) for option in options_at(place)}
 
 
-def values_in_range(args: argparse.Namespace, place: Place) -> dict[str, Any]:
+def values_in_range(args: Namespace, place: Place) -> dict[str, Any]:
     """Return the value of each option of a command, by the option's name.
 
     :raises UsageError: an argument cannot be parsed, or a number is out of its range.
@@ -154,7 +154,7 @@ def values_in_range(args: argparse.Namespace, place: Place) -> dict[str, Any]:
     return values
 
 
-def non_default_arguments(args: argparse.Namespace) -> dict[str, str | None]:
+def non_default_arguments(args: Namespace) -> dict[str, str | None]:
     """Return the arguments that differ from their defaults, for the process that captures one clip
     of a batch.
 
@@ -178,7 +178,7 @@ def _text(option: Option, value: Any) -> str:
     return os.path.abspath(value) if is_file else str(value)
 
 
-def _argument(option: Option, args: argparse.Namespace) -> Any:
+def _argument(option: Option, args: Namespace) -> Any:
     return getattr(args, option.flag.lstrip("-").replace("-", "_"))
 
 

@@ -5,10 +5,10 @@ clip, which are not for users.
 
 from __future__ import annotations
 
-import argparse
 import math
 import os
 import re
+from argparse import SUPPRESS, ArgumentParser, Namespace
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -33,7 +33,7 @@ WINDOW_SECONDS = "--window-seconds"
 _MIN_S = 0.1
 
 
-def dask_runner(args: argparse.Namespace, program: Sequence[str] | None) -> DaskRunner:
+def dask_runner(args: Namespace, program: Sequence[str] | None) -> DaskRunner:
     """Connect to the cluster of ``--scheduler``.
 
     :param program: command that the workers run; None for their own installation.
@@ -55,7 +55,7 @@ def folder_argument(text: str) -> Path | str:
     return text if is_url(text) else path_argument(text)
 
 
-def local_folders(args: argparse.Namespace, stack: ExitStack) -> tuple[Path, Path]:
+def local_folders(args: Namespace, stack: ExitStack) -> tuple[Path, Path]:
     """Return the folders of footage and results; for a URL, a folder with files of the same names.
 
     :param stack: removes that folder.
@@ -79,19 +79,19 @@ def local_folders(args: argparse.Namespace, stack: ExitStack) -> tuple[Path, Pat
     return folder, out
 
 
-def add_window_arguments(capture: argparse.ArgumentParser) -> None:
+def add_window_arguments(capture: ArgumentParser) -> None:
     """Add the arguments of a process that captures a clip, or a part of it."""
-    capture.add_argument(WINDOWS, default="", help=argparse.SUPPRESS)
-    capture.add_argument(WINDOWS_FOLDER, type=path_argument, help=argparse.SUPPRESS)
+    capture.add_argument(WINDOWS, default="", help=SUPPRESS)
+    capture.add_argument(WINDOWS_FOLDER, type=path_argument, help=SUPPRESS)
     add_window_seconds(capture)
 
 
-def add_window_seconds(parser: argparse.ArgumentParser) -> None:
+def add_window_seconds(parser: ArgumentParser) -> None:
     """Add the length of windows, which tests make shorter."""
-    parser.add_argument(WINDOW_SECONDS, type=float, help=argparse.SUPPRESS)
+    parser.add_argument(WINDOW_SECONDS, type=float, help=SUPPRESS)
 
 
-def with_window_seconds(options: CaptureOptions, args: argparse.Namespace) -> CaptureOptions:
+def with_window_seconds(options: CaptureOptions, args: Namespace) -> CaptureOptions:
     """Return the options with the length of windows that an argument gives.
 
     :raises UsageError: it is too short.
@@ -106,7 +106,7 @@ def with_window_seconds(options: CaptureOptions, args: argparse.Namespace) -> Ca
 
 
 def window_report(
-    args: argparse.Namespace, video: Path, options: CaptureOptions, progress: Progress
+    args: Namespace, video: Path, options: CaptureOptions, progress: Progress
 ) -> dict[str, Any] | None:
     """Do what `WINDOWS` asks for, and return the report; None where the whole clip is to be
     captured.

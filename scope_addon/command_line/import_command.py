@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+from argparse import ArgumentParser, Namespace
 from typing import Any
 
 from ...solver.smpl_family import SKELETONS
@@ -25,7 +25,7 @@ from .outputs import (
 from .terminal import print_message
 
 
-def add_import(parser: argparse.ArgumentParser) -> None:
+def add_import(parser: ArgumentParser) -> None:
     """Add the arguments of ``scope import``."""
     parser.add_argument(
         "motion",
@@ -38,7 +38,7 @@ def add_import(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=run_import, file_per_person=False)
 
 
-def run_import(args: argparse.Namespace) -> dict[str, Any]:
+def run_import(args: Namespace) -> dict[str, Any]:
     """Run ``scope import``: read the motion, write every output; return the report.
 
     :raises ScopeError: an argument is invalid, the motion cannot be used, or an output failed.

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from ..live.run import LiveOptions, Output
 
 
-def add_live(parser: argparse.ArgumentParser) -> None:
+def add_live(parser: ArgumentParser) -> None:
     """Add the arguments of ``scope live``."""
     parser.add_argument(
         "source",
@@ -52,7 +52,7 @@ def add_live(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=run_live_command)
 
 
-def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
+def run_live_command(args: Namespace) -> dict[str, Any]:
     """Run ``scope live`` until the source ends or Ctrl-C, or ask a camera for its formats; return
     the report.
 
@@ -91,9 +91,7 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     return report
 
 
-def _capture(
-    args: argparse.Namespace, values: Mapping[str, Any], options: LiveOptions
-) -> dict[str, Any]:
+def _capture(args: Namespace, values: Mapping[str, Any], options: LiveOptions) -> dict[str, Any]:
     """Capture until the source ends or Ctrl-C, and return the report.
 
     :raises ScopeError: the source cannot be read, or an output failed.

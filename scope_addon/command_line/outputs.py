@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-import argparse
 import os
+from argparse import Namespace
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -169,7 +169,7 @@ def check_outputs(
     refuse_inputs(written, files_to_read(inputs))
 
 
-def confine(args: argparse.Namespace, outputs: list[Path], *, connects: bool = False) -> None:
+def confine(args: Namespace, outputs: list[Path], *, connects: bool = False) -> None:
     """Confine this process before it decodes what others have made, if it is the command's own
     rather than Blender's, or that of a program which calls the command line.
 
@@ -207,7 +207,7 @@ def distinct_paths(outputs: list[Path]) -> list[Path]:
     return list(by_real_path.values())
 
 
-def _check_output_options(args: argparse.Namespace, outputs: list[Path]) -> None:
+def _check_output_options(args: Namespace, outputs: list[Path]) -> None:
     """Check that each option which says how an output is written has such an output.
 
     :raises UsageError: it has none.
@@ -247,7 +247,7 @@ def _check_output_options(args: argparse.Namespace, outputs: list[Path]) -> None
 
 
 def checked_rigs(
-    args: argparse.Namespace, outputs: list[Path], fingers: bool, face: bool
+    args: Namespace, outputs: list[Path], fingers: bool, face: bool
 ) -> list[RigSource]:
     """Check the user's rigs before the capture starts and return them; none without --retarget.
 
@@ -278,9 +278,7 @@ def checked_rigs(
     return checked
 
 
-def _arguments_of_rigs(
-    args: argparse.Namespace, outputs: list[Path], face: bool
-) -> list[list[Any]]:
+def _arguments_of_rigs(args: Namespace, outputs: list[Path], face: bool) -> list[list[Any]]:
     """Return names, bone maps and expression maps of the user's rigs, each a list with an entry for
     each rig; nothing without --retarget.
 
@@ -332,7 +330,7 @@ def write_outputs(
     motions: list[Motion],
     body: Body,
     video: Path,
-    args: argparse.Namespace,
+    args: Namespace,
     rigs: Sequence[RigSource] = (),
     views: Sequence[Path] = (),
 ) -> tuple[list[Path], list[Notice]]:
@@ -394,12 +392,12 @@ def write_outputs(
     return written, warnings
 
 
-def _footage(video: Path, args: argparse.Namespace) -> Path | None:
+def _footage(video: Path, args: Namespace) -> Path | None:
     """Return the footage to show; None for an imported motion."""
     return None if args.command == "import" else _shown_file(video, args)
 
 
-def _shown_file(footage: Path, args: argparse.Namespace) -> Path:
+def _shown_file(footage: Path, args: Namespace) -> Path:
     """Return the file that Blender shows: of numbered pictures, the first one."""
     from ..capture.media.image_sequence import find_sequence
 

@@ -8,9 +8,9 @@ those that Scope itself has chosen from a list.
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
+from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -46,7 +46,7 @@ _KNOWN_TEXTS = frozenset(
 )
 
 
-def add_problem_report(parser: argparse.ArgumentParser) -> None:
+def add_problem_report(parser: ArgumentParser) -> None:
     """Add the arguments of ``scope report-a-problem``."""
     parser.add_argument(
         "report",
@@ -66,7 +66,7 @@ def add_problem_report(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=run_problem_report, json=False)
 
 
-def run_problem_report(args: argparse.Namespace) -> dict[str, Any]:
+def run_problem_report(args: Namespace) -> dict[str, Any]:
     """Run ``scope report-a-problem``: write the file, and return what it says.
 
     :raises InputError: the report of the capture cannot be read, or is something else.
