@@ -425,12 +425,10 @@ def by_geometry(rest: RestPose) -> dict[str, str]:
         ends[limb] = [bone for bone in bones if person in rest.chains[bone]] or bones
     chains: dict[str, list[int]] = {}
     for side, outwards in (("left", leftwards), ("right", -leftwards)):
-        leg = f"{side} leg"
-        arm = f"{side} arm"
-        chains[leg] = min((rest.chains[bone] for bone in ends[leg]), key=len)
-        if ends[arm]:
+        chains[f"{side} leg"] = min((rest.chains[b] for b in ends[f"{side} leg"]), key=len)
+        if hands := ends[f"{side} arm"]:
             # One hand's fingers, not another chain that ends at the same place.
-            chains[arm] = rest.chains[max(ends[arm], key=lambda bone: outwards[bone])]
+            chains[f"{side} arm"] = rest.chains[hands[int(np.argmax(outwards[hands]))]]
     shared = [bone for bone in chains["left leg"] if bone in chains["right leg"]]
     if not shared:
         return {}
