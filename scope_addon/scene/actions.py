@@ -347,6 +347,18 @@ def nla_strips(datablock: ID) -> list[NlaStrip]:
     return [strip for track in tracks for strip in track.strips if not strip.mute]
 
 
+def nla_fcurves(datablock: ID) -> list[FCurve]:
+    """Return the F-curves in the NLA strips in effect for a datablock, also within meta strips."""
+    curves = []
+    strips = nla_strips(datablock)
+    while strips:
+        strip = strips.pop()
+        strips += strip.strips
+        if strip.action is not None:
+            curves += fcurves_in_slot(strip.action, getattr(strip, "action_slot", None))
+    return curves
+
+
 def animated_together(armature: Object, root: Object | None) -> list[ID]:
     """Return an armature with an action, and of its root object and the shape keys of its meshes
     those that move.

@@ -14,7 +14,7 @@ from mathutils import Matrix
 from ..arrays import Float64Array
 from ..kinematics.smoothing import continuous_quaternions
 from ..retarget.rest_pose import BoneMotion, Skeleton
-from .actions import Channels, bone_path, fcurves_of, nla_strips, read_keys
+from .actions import Channels, bone_path, fcurves_of, nla_fcurves, read_keys
 from .stored_values import KEYS_OF, source_of
 from .timing import Retiming, retime_keys
 
@@ -63,12 +63,7 @@ def write_action(rig: Object, keys: list[BoneMotion], frames: Float64Array, sour
     for key in keys:
         if key.locations is not None:
             channels.write(bone_path(key.bone, "location"), frames, key.locations, group=key.bone)
-    below = {
-        curve.data_path
-        for strip in nla_strips(rig)
-        if strip.action
-        for curve in fcurves_of(strip.action)
-    }
+    below = {curve.data_path for curve in nla_fcurves(rig)}
     for key in keys:
         for channel, value in _OFFSETS.items():
             if (path := bone_path(key.bone, channel)) in below and (

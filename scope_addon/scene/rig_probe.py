@@ -26,7 +26,7 @@ from ..notices import Notice, notice
 from ..retarget.bone_map import PHALANGES, check_bone_count
 from ..retarget.fingers import bone_ends
 from ..retarget.rest_pose import BoneMotion, RestPose, Skeleton
-from .actions import assign_action, bone_path, fcurves_of, nla_strips, read_keys, used_slot
+from .actions import assign_action, bone_path, nla_fcurves, read_keys, used_slot
 from .character.root_object import root_object, topmost
 from .datablocks import changed, is_deformed_by, modifiers_off
 from .rig_action import channel_of_rotation
@@ -358,13 +358,7 @@ def posed_bones(rig: Object, names: Sequence[str]) -> list[Notice]:
     above = dict.fromkeys(
         bone.name for name in names for bone in rig.data.bones[name].parent_recursive
     )
-    in_nla = {
-        curve.data_path
-        for strip in nla_strips(rig)
-        if strip.action
-        for curve in fcurves_of(strip.action)
-        if _leaves_rest(curve)
-    }
+    in_nla = {curve.data_path for curve in nla_fcurves(rig) if _leaves_rest(curve)}
     moving = [
         name
         for name in above

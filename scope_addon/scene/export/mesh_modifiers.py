@@ -88,13 +88,13 @@ def _modifiers_in_motion(scene: Scene, objects: Sequence[Object]) -> set[bpy.typ
     for obj in objects:
         kinds = [modifier.type for modifier in obj.modifiers]
         drivers = obj.animation_data.drivers if obj.animation_data else ()
-        curves = [curve for curve in (*actions.fcurves(obj), *drivers) if curve.is_valid]
+        curves = [*actions.fcurves(obj), *actions.nla_fcurves(obj), *drivers]
         for position, modifier in enumerate(obj.modifiers):
             if modifier.type in (_MOVING | _PLACED if "ARMATURE" in kinds[:position] else _MOVING):
                 found.add(modifier)
             own = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]'
             for curve in curves:
-                if curve.data_path.startswith(own):
+                if curve.data_path.startswith(own) and _leads_to_a_value(obj, curve.data_path):
                     values[modifier, curve.data_path] = []
     with current_frame_kept(scene):
         for frame in np.linspace(scene.frame_start, scene.frame_end, _SAMPLES) if values else ():
@@ -104,6 +104,15 @@ def _modifiers_in_motion(scene: Scene, objects: Sequence[Object]) -> set[bpy.typ
                 value = modifier.id_data.evaluated_get(graph).path_resolve(path)
                 seen.append(np.ravel(value).tolist())
     return found.union(modifier for (modifier, _), seen in values.items() if seen[1:] != seen[:-1])
+
+
+def _leads_to_a_value(obj: Object, data_path: str) -> bool:
+    """Return whether an object has a property, which its curves may outlive."""
+    try:
+        obj.path_resolve(data_path)
+    except ValueError:
+        return False
+    return True
 
 
 def _modified_mesh(scene: Scene, obj: Object) -> tuple[Mesh, list[str]]:

@@ -4,6 +4,7 @@
 import bpy
 import numpy as np
 import pytest
+from scope.scope_addon.scene.actions import Channels
 from scope.scope_addon.scene.export.export import ExportOptions
 from scope.scope_addon.scene.rig_file import export_rig
 
@@ -105,10 +106,16 @@ def _moving(skin, how):
     modifier = skin.modifiers.new("Odd", kind)
     if kind == "DISPLACE":
         skin.modifiers.move(1, 0)
-    if how == "keyed":
+    if how in ("keyed", "in the NLA"):
         for frame in (1, LAST):
             modifier.strength = 0.3 * frame
             modifier.keyframe_insert("strength", frame=frame)
+    if how == "in the NLA":
+        animation = skin.animation_data
+        lost = 'modifiers["Odd"].a_property_of_another_kind'
+        Channels(skin, animation.action).write(lost, np.arange(2.0), np.eye(2)[:, :1])
+        animation.nla_tracks.new().strips.new("own", 1, animation.action)
+        animation.action = None
     elif how == "driven":
         variable = modifier.driver_add("strength").driver.variables.new()
         variable.type = "TRANSFORMS"
@@ -119,7 +126,10 @@ def _moving(skin, how):
 
 @pytest.mark.parametrize(
     ("how", "is_said"),
-    [("keyed", True), ("driven", True), ("after the armature", True), ("still", False)],
+    [
+        *[("keyed", True), ("in the NLA", True), ("driven", True), ("after the armature", True)],
+        ("still", False),
+    ],
 )
 def test_a_modifier_whose_effect_changes_with_the_motion_is_said(tmp_path, how, is_said):
     rig, skin = half_a_face()
