@@ -223,10 +223,11 @@ def motion_of_parts(tree: Tree, pose: Pose) -> Array:
     n = 3 + 3 * len(tree.parents) + tree.shape
     X = np.zeros((len(tree.parents), 6, n))
     X[0] = np.eye(6, n)
+    levers = hat(pose.t - pose.t[0])
     for i, parent in enumerate(tree.parents[1:], start=1):
         X[i] = X[parent]
         X[i, :3, 3 + 3 * i : 6 + 3 * i] = np.eye(3)
-        X[i, 3:, 3 + 3 * i : 6 + 3 * i] = hat(pose.t[i] - pose.t[0])
+        X[i, 3:, 3 + 3 * i : 6 + 3 * i] = levers[i]
     return X
 
 

@@ -109,7 +109,13 @@ def _select(
         later = S[np.ix_(kept, kept)]
         J = motion_of_joints(tree, pose_of(poses, f))
         of_frame = S[np.ix_(rows, rows)]
-        out.joints[f] = J @ of_frame @ J.transpose(0, 2, 1)
-        J -= J[:1].copy()
-        out.from_root[f] = J @ of_frame @ J.transpose(0, 2, 1)
+        out.joints[f] = _projected(of_frame, J)
+        out.from_root[f] = _projected(of_frame, J - J[0])
     return later
+
+
+def _projected(S: Array, J: Array) -> Array:
+    """Return J S Jᵀ (K+1, 3, 3) of J (K+1, 3, n), by one large product instead of many small."""
+    JS = (J.reshape(-1, len(S)) @ S).reshape(J.shape)
+    projected: Array = JS @ J.transpose(0, 2, 1)
+    return projected
