@@ -167,7 +167,7 @@ class FrameObserver:
         self._masks = MaskSchedule(trackers.people.mask_network, video.expected_frames)
         self._pool = pool
         self._clock = clock
-        self._cuts = SceneCuts()
+        self._cuts = SceneCuts(float(video.fps))
         self._exposure = AutoExposure()
         # The next frame in the brightness that the networks are given.
         self._upcoming_lit: Uint8Array | None = None

@@ -241,7 +241,7 @@ def changes_of(shown, noise=1.0):
     """
     rng = np.random.default_rng(1)
     room = cv2.resize(rng.integers(0, 256, (9, 16, 3), dtype=np.uint8), (320, 180)).astype(float)
-    cuts = SceneCuts()
+    cuts = SceneCuts(RATE)
     for k, moment in enumerate(shown):
         picture = room + noise * np.random.default_rng(k).normal(size=room.shape)
         x = 40 + round(1.5 * moment)

@@ -38,25 +38,27 @@ MIN_DIFFERENCE_OF_PATTERN = 0.6
 # all but those between similar rooms. In none of the clips, nor in 400 pans and zooms over their
 # pictures, is there a cut by them: the frames with such a difference leave at least 0.29.
 BLENDED_FRAMES = 30
+_BLENDED_FPS = 30.0  # at which these are a second; of higher rates, every second frame or fewer
 MIN_DIFFERENCE_OF_BLENDED = 0.8  # of the patterns of the first and last of these
 MAX_NOT_BLENDED = 0.2  # share of a frame's pattern, as squares, that the two do not explain
 
 
 class SceneCuts:
-    """Detects cuts in frames that come in order.
+    """Detects cuts in frames that come in order, so many per second.
 
     ``changes``: of each frame so far, the largest change of a place in it from the frame before, of
     255; 0 for the first.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, fps: float) -> None:
         self.changes: list[float] = []
         self._last: Float32Array | None = None
         self._before: Float32Array | None = None
         self._upcoming: Float32Array | None = None
         self._is_after_gap = False  # blank frames follow `_before`
         self._differences: deque[float] = deque(maxlen=HISTORY_FRAMES)
-        self._recent: deque[Float32Array] = deque(maxlen=BLENDED_FRAMES + 1)
+        self._every = max(1, round(fps / _BLENDED_FPS))
+        self._recent: deque[Float32Array] = deque(maxlen=self._every * BLENDED_FRAMES + 1)
 
     def is_cut(self, image_rgb: Uint8Array, upcoming_rgb: Uint8Array | None) -> bool:
         """Return whether this frame begins another scene; the first frame of a clip does not.
@@ -96,7 +98,8 @@ class SceneCuts:
             self._is_after_gap = False
         if not is_cut:
             self._differences.append(change)
-            is_cut = len(self._recent) > BLENDED_FRAMES and _is_blended(self._recent)
+            recent = list(self._recent)[:: self._every]
+            is_cut = len(recent) > BLENDED_FRAMES and _is_blended(recent)
         if is_cut:
             self._recent.clear()
         return is_cut

@@ -27,8 +27,8 @@ def scene(seed: int, width: int = W) -> np.ndarray:
     return cv2.resize(coarse, (width, H), interpolation=cv2.INTER_CUBIC)
 
 
-def cuts(frames: Sequence[np.ndarray]) -> list[float]:
-    found = SceneCuts()
+def cuts(frames: Sequence[np.ndarray], fps: float = 30.0) -> list[float]:
+    found = SceneCuts(fps)
     cuts = []
     for t, (frame, upcoming) in enumerate(zip(frames, [*frames[1:], None], strict=True)):
         if found.is_cut(frame, upcoming):
@@ -93,6 +93,15 @@ def test_a_dissolve_and_a_fade_are_a_cut(frames: int, through: int | None) -> No
     found = cuts([*[scene(0)] * 40, *middle, *[scene(1)] * 40])
     assert 40 + frames / 2 - 1 <= found[-1] <= 40 + frames + 5
     assert len(found) == 1 or (frames == 6 and through is not None and found[0] >= 40)
+
+
+@pytest.mark.parametrize("through", [None, 0, 255])
+def test_a_dissolve_of_a_second_is_a_cut_at_any_rate(through: int | None) -> None:
+    colour = None if through is None else np.full((H, W, 3), through, np.uint8)
+    for fps in (60, 120):
+        middle = [mixed(scene(0), scene(1), (k + 1) / (fps + 1), colour) for k in range(fps)]
+        (cut,) = cuts([*[scene(0)] * fps, *middle, *[scene(1)] * fps], fps)
+        assert 1.5 * fps - 1 <= cut <= 2.2 * fps
 
 
 def test_a_dissolve_between_real_clips_is_a_cut(
