@@ -116,6 +116,7 @@ def test_threads_that_run_already_do_not_connect_either() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("blender_module")
 def test_a_command_is_confined_and_writes_its_results(
     outside: Path, port: int, tmp_path: Path, temporary: Path
 ) -> None:

@@ -80,7 +80,7 @@ def test_a_long_clip_is_captured_in_windows_and_counted_once(cluster: Any, folde
     assert result(folder, "a") == "0 1 2 3 4 5 6 "
     assert result(folder, "b") == "whole"
     # and no window
-    assert files(folder) == ["a.glb", "a.npz", "b.glb", "b.npz", "scope-batch.json"]
+    assert files(folder) == ["a.csv", "a.npz", "b.csv", "b.npz", "scope-batch.json"]
     long, short = report["files"]
     assert (long["windows"], "windows" in short) == (7, False)
     rows = report["workers"]

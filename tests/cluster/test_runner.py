@@ -82,7 +82,7 @@ def calls(clip):
 def run(cluster, folder, program=PROGRAM):
     """Run the command with a cluster or a scheduler file, and return its status and its report."""
     out = folder.parent / "out"
-    argv = ["batch", str(folder), "--out", str(out), "--formats", "npz,glb", "--recursive"]
+    argv = ["batch", str(folder), "--out", str(out), "--formats", "npz,csv", "--recursive"]
     address = str(getattr(cluster, "scheduler_address", cluster))
     argv += ["--scheduler", address]
     status = main(argv, program=[sys.executable, "-c", program])
@@ -133,7 +133,7 @@ def test_every_clip_has_its_outcome_and_a_second_run_captures_what_has_changed(
     warnings = {e["file"]: e["report"]["warnings"] for e in report["files"] if "report" in e}
     assert warnings["a.mp4"] == []
     assert "not part of this result: 'd.person2.npz';" in warnings["below/d.mp4"][0]
-    outputs = ["a.glb", "a.npz", "below", "below/d.glb", "below/d.npz", "below/d.person2.npz"]
+    outputs = ["a.csv", "a.npz", "below", "below/d.csv", "below/d.npz", "below/d.person2.npz"]
     assert files(folder) == sorted([*outputs, REPORT_NAME])
     assert (folder.parent / "out" / "below" / "d.npz").read_text("utf-8") == "result of d"
     staged, shown = (calls(folder / "below" / "d.mp4")[0]["arguments"][k] for k in (6, -1))
@@ -148,7 +148,7 @@ def test_every_clip_has_its_outcome_and_a_second_run_captures_what_has_changed(
     assert said[4].split()[1:5] == ["worker", "host", "threads", "state"]
 
     (folder / "a.mp4").write_text("changed")
-    (folder.parent / "out" / "below" / "d.glb").unlink()
+    (folder.parent / "out" / "below" / "d.csv").unlink()
     status, report = run(cluster, folder)
     assert report["counts"] == {"done": 2, "skipped": 0, "no_person": 1, "failed": 1}
     assert [len(calls(folder / name)) for name in clips] == [2, 2, 1, 2]
@@ -173,7 +173,7 @@ def test_a_clip_of_a_killed_worker_is_captured_by_another_and_its_process_ends(c
     assert status == 0
     assert [e["status"] for e in report["files"]] == ["done"] * 3
     assert files(folder) == sorted(
-        [*(f"{n}.{s}" for n in "abc" for s in ("npz", "glb")), REPORT_NAME]
+        [*(f"{n}.{s}" for n in "abc" for s in ("npz", "csv")), REPORT_NAME]
     )
     first, second = calls(folder / "b.mp4")
     assert first["arguments"][6] != second["arguments"][6]  # a folder of its own for each attempt
@@ -194,7 +194,7 @@ def test_a_clip_that_ends_its_workers_fails_and_the_others_are_captured(
     assert [e["status"] for e in report["files"]] == ["failed", "done", "done"]
     assert "lost while they captured it" in report["files"][0]["message"]
     assert files(folder) == sorted(
-        [*(f"{n}.{s}" for n in "bc" for s in ("npz", "glb")), REPORT_NAME]
+        [*(f"{n}.{s}" for n in "bc" for s in ("npz", "csv")), REPORT_NAME]
     )
 
 
@@ -339,5 +339,5 @@ def test_a_lost_scheduler_is_a_sentence_and_finished_clips_are_kept(
         said = capsys.readouterr().err.splitlines()
         assert "the connection to the Dask scheduler was lost; finished clips are kept" in said[-1]
         assert [e["status"] for e in report["files"]] == ["done"]
-        assert files(folder) == ["a.glb", "a.npz", REPORT_NAME]
+        assert files(folder) == ["a.csv", "a.npz", REPORT_NAME]
         wait_for(lambda: not runs(calls(folder / "b.mp4")[0]["pid"]))

@@ -11,8 +11,6 @@ from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line.outputs import default_outputs, write_outputs
 from scope.scope_addon.errors import UsageError
 
-from ..required import package
-
 
 def test_results_lie_next_to_the_footage(tmp_path):
     assert default_outputs(tmp_path / "walk.mov") == [tmp_path / "walk.npz", tmp_path / "walk.glb"]
@@ -100,8 +98,8 @@ def test_files_of_an_earlier_number_of_people_stay_and_are_named(
         assert (tmp_path / name).read_text("utf-8") == "earlier"
 
 
+@pytest.mark.usefixtures("blender_module")
 def test_a_scene_shows_the_first_picture_of_folders_of_further_cameras(tmp_path, monkeypatch):
-    package("bpy")
     from scope.scope_addon.scene.export import export
 
     folder = tmp_path / "right"

@@ -133,7 +133,7 @@ def test_the_file_of_one_of_several_people_is_no_input(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def texture_and_rigs(tmp_path_factory):
+def texture_and_rigs(tmp_path_factory, blender_module):
     """The texture of a rig, which is read whenever the rig is exported, and files of the rig."""
     folder = tmp_path_factory.mktemp("rigs")
     texture = folder / "texture.png"

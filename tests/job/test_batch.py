@@ -547,7 +547,8 @@ def test_a_signal_whose_exception_is_lost_ends_the_batch_too(folder, tmp_path, m
         return {"status": "failed", "file": task.name, "message": ""}
 
     monkeypatch.setattr(LocalRunner, "_capture", runs_on)
-    assert main(["batch", str(folder), "--out", str(tmp_path / "out"), "--jobs", "2"]) == 130
+    argv = ["batch", str(folder), "--out", str(tmp_path / "out"), "--formats", "npz", "--jobs", "2"]
+    assert main(argv) == 130
     assert "stopped; finished clips are kept" in capsys.readouterr().err
 
 
@@ -589,9 +590,9 @@ def test_invalid_options_are_reported_once_before_the_first_clip(
 ):
     (tmp_path / "lens.json").write_text("{}")
     (tmp_path / "net.onnx").write_bytes(b"no network")
-    given = [a.format(tmp=tmp_path) for a in argv]
-    program = [sys.executable, "-c", PROGRAM]
-    assert main(["batch", str(folder), "--out", str(tmp_path / "out"), *given], program) == status
+    command = ["batch", str(folder), "--out", str(tmp_path / "out"), "--formats", "npz"]
+    command += [a.format(tmp=tmp_path) for a in argv]
+    assert main(command, [sys.executable, "-c", PROGRAM]) == status
     err = capsys.readouterr().err
     assert says in err
     assert err.count("\n") == 1
