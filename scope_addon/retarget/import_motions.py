@@ -47,6 +47,7 @@ _UNITS = {100: "cm", 1000: "mm"}
 # unit has below 0.8 of the slip without translation.
 _LESS_SLIP = 0.1
 _LESS_SLIP_THAN_IN_PLACE = 0.7
+_FASTEST_M_S = 60.0  # of a person for half of a clip: a skydiver
 _CAMERA_DISTANCE_M = 10.0  # in front of the nearest position; motion files need a camera
 
 
@@ -122,8 +123,26 @@ def import_motions(
                 )
             )
         imported = convert(source, loaded, path, up, rate, begin)
+        _check_speed(imported.motion, path, source.trans_name)
         found.append(replace(imported, notes=[*notes, *imported.notes]))
     return found
+
+
+def _check_speed(motion: Motion, path: Path, array: str) -> None:
+    """Refuse a person who is faster than anybody, where feet that never rest tell no unit.
+
+    :param array: name of the translations.
+    :raises MotionFileError: it is such a person.
+    """
+    steps_m = np.linalg.norm(np.diff(motion.trans, axis=0), axis=1)
+    if not len(steps_m):
+        return
+    speed_m_s = float(np.median(steps_m / np.diff(motion.timestamps)))
+    if speed_m_s > _FASTEST_M_S:
+        raise MotionFileError(
+            f"{path}: {array} moves the person at {speed_m_s:.3g} m/s; it must be in metres, and "
+            "the frame rate that of the motion"
+        )
 
 
 def _units_per_metre(sources: Sequence[SmplMotion], body: Body) -> int:

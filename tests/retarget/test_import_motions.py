@@ -164,6 +164,18 @@ def test_translations_in_another_unit_are_converted_and_said(tmp_path, axis, per
     assert "other_unit" not in [note.code for note in in_metres.notes]
 
 
+def test_a_person_faster_than_anybody_whose_feet_never_rest_is_an_error(tmp_path):
+    rng = np.random.default_rng(1)
+    arrays = in_file("z")
+    poses = arrays["poses"] + rng.normal(scale=0.3, size=arrays["poses"].shape)
+    trans = arrays["trans"] + rng.normal(scale=0.02, size=arrays["trans"].shape)
+    np.savez(tmp_path / "mm.npz", **arrays | {"poses": poses, "trans": 1000 * trans})
+    with pytest.raises(MotionFileError, match=r"mm\.npz: trans moves the person at .* metres"):
+        import_motion(tmp_path / "mm.npz")
+    np.savez(tmp_path / "m.npz", **arrays | {"poses": poses, "trans": trans})
+    assert import_motion(tmp_path / "m.npz")
+
+
 @pytest.mark.parametrize("velocity", [[0.0, 8.0, 0.0], [0.0, 0.0, 2.0]])
 @pytest.mark.parametrize("is_still", [False, True])
 def test_whom_skates_or_a_lift_carry_is_in_metres(tmp_path, velocity, is_still):
