@@ -44,7 +44,7 @@ _NEAR = 0.005
 # Lengths of mirror images differ by no more than this share.
 _ALIKE = 0.03
 _SLIGHT = 0.01  # The weight of a bone without a mirror image.
-# What is higher than this share of the highest bone in the middle belongs to the head.
+# What is no lower than this share of the highest bone in the middle belongs to the head.
 _HIGH = 0.9
 # The tip of a head is above it by more than this multiple of the neck's bones.
 _TIP_LENGTH = 1.4
@@ -419,7 +419,7 @@ def by_geometry(rest: RestPose) -> dict[str, str]:
         return {}
     central = np.flatnonzero(abs(leftwards) < 0.1).tolist() or leaves
     highest = max(upwards[bone] for bone in central)
-    ends["head"] = [bone for bone in central if upwards[bone] > _HIGH * highest]
+    ends["head"] = [bone for bone in central if upwards[bone] >= _HIGH * highest]
     person = _person(rest, list(ends.values()))
     for limb, bones in ends.items():
         ends[limb] = [bone for bone in bones if person in rest.chains[bone]] or bones

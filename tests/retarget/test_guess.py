@@ -83,6 +83,18 @@ def test_an_arm_of_a_single_bone_has_no_joints_but_a_shoulder():
     assert found["q2"] == "left_knee"
 
 
+def test_legs_alone_are_mapped_by_geometry() -> None:
+    """With nothing in the middle but a root on the floor."""
+    leg = np.array([[0.15, 0.0, 0.9], [0.15, -0.02, 0.5], [0.15, 0.0, 0.1]])
+    heads = np.concatenate([np.zeros((1, 3)), leg, leg * [-1.0, 1.0, 1.0]])
+    rest = RestPose(list("rabcdef"), np.array([-1, 0, 1, 2, 0, 4, 5]), heads)
+    parts = [
+        "pelvis",
+        *(f"{side}_{p}" for side in ("left", "right") for p in ("hip", "knee", "ankle")),
+    ]
+    assert by_geometry(rest) == dict(zip(rest.names, parts, strict=True))
+
+
 @pytest.mark.parametrize("tilt", [0.0, -0.35, 0.35])
 @pytest.mark.parametrize("drop", [0.0, 0.8])
 def test_a_rig_has_the_same_map_whichever_way_it_is_turned(drop: float, tilt: float) -> None:
