@@ -144,8 +144,9 @@ def _by_geometry(rest: RestPose, wrist: int, below: list[int]) -> dict[str, list
     for finger, k in zip(FINGERS, order, strict=True):
         chain = chains[k]
         from_wrist = np.linalg.norm(heads[chain] - heads[wrist], axis=1)
-        palm = finger != "thumb" and len(chain) > _PHALANGES and from_wrist[0] < 0.5 * from_wrist[1]
-        out[finger] = chain[palm:]
+        is_long = finger != "thumb" and len(chain) > _PHALANGES
+        begins_in_palm = is_long and from_wrist[0] < 0.5 * from_wrist[1]
+        out[finger] = chain[1:] if begins_in_palm else chain
     return out
 
 

@@ -100,3 +100,20 @@ def test_fingers_without_names_are_found_by_their_shape_in_any_order(turn):
     shuffled = np.array([place.get(int(parents[old]), -1) for old in order])
     rest = RestPose([names[old] for old in order], shuffled, heads[order])
     assert find_fingers(rest, HAND) == expected(names)
+
+
+def test_bones_in_the_palm_are_no_phalanges_of_fingers_without_names():
+    names, parents, heads = hand("b{finger}_{k}", "abcde")
+    for knuckle in (4, 7, 10, 13):
+        parents[knuckle] = len(names)
+        names = [*names, f"palm{knuckle}"]
+    palms = heads[0] + 0.3 * (heads[[4, 7, 10, 13]] - heads[0])
+    order = [0, *range(16, 20), *range(1, 16)]  # parents come before children
+    place = np.argsort(order)
+    whole = np.array([*parents, 0, 0, 0, 0])[order]
+    rest = RestPose(
+        [names[row] for row in order],
+        np.where(whole < 0, -1, place[whole]),
+        np.concatenate([heads, palms])[order],
+    )
+    assert find_fingers(rest, HAND) == expected(names)
