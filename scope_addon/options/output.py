@@ -106,8 +106,8 @@ OUTPUT_OPTIONS = (
         bool,
         False,
         _FILES | Place.EXPORT,
-        "leave out bones of a rig that deform nothing, such as controls, in .glb and .fbx files; "
-        "in .fbx, those with deforming bones below them stay",
+        "leave out bones of a rig that deform nothing, such as controls, in .glb, .fbx and .usdc "
+        "files; except in .glb, those with deforming bones below them stay",
         blender=Property(label="Only Deform Bones"),
     ),
     Option(

@@ -177,7 +177,7 @@ class SCOPE_OT_export(SavingOperator):
             layout.prop(self, "bvh_unit")
         elif self.format not in _OF_MOTION:
             layout.prop(self, "shape")
-            if self.which == "RIG" and self.format in ("FBX", "GLB"):
+            if self.which == "RIG" and self.format in ("FBX", "GLB", "USDC"):
                 layout.prop(self, "deform_bones")
             if self.which != "RIG":
                 layout.prop(self, "camera")

@@ -65,7 +65,7 @@ class ExportOptions:
     shape: str = "auto"
     separate: bool = False  # one file per person, also in formats that can hold several
     bvh_unit: str = "cm"  # of the lengths in .bvh: "cm" or "m"
-    deform_bones: bool = False  # leave out bones that deform nothing, in .glb and .fbx
+    deform_bones: bool = False  # leave out bones that deform nothing, in .glb, .fbx and .usdc
     skeleton: str = OWN  # whose names the bones have, in all formats but .blend
     take: str = ""  # name of the animation; empty: the capture's
     unit: float = 0.0  # metres that a length of 1 stands for; 0: as ``unit_of_captures`` says
@@ -168,7 +168,7 @@ def _write_one(
             raise UsageError(
                 f"cannot write {path.name}: the capture's armature is not in a scene; capture again"
             )
-        leaves_controls_out = options.deform_bones and suffix in (".glb", ".fbx")
+        leaves_controls_out = options.deform_bones and suffix in (".glb", ".fbx", ".usdc")
         if leaves_controls_out and not any(bone.use_deform for bone in rig.data.bones):
             raise UsageError(
                 f"no bone of '{rig.name}' deforms anything, so none would be left; switch Only "
@@ -184,7 +184,9 @@ def _write_one(
             ".fbx": lambda temporary: formats.write_fbx(
                 temporary, options.camera, take, options.deform_bones
             ),
-            ".usdc": lambda temporary: formats.write_usd(temporary, options.camera),
+            ".usdc": lambda temporary: formats.write_usd(
+                temporary, options.camera, options.deform_bones
+            ),
             ".blend": lambda temporary: formats.write_blend(temporary, scene),
         }
         _write(path, writers[suffix])

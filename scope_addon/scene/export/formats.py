@@ -154,10 +154,11 @@ def write_fbx(
     correct_fbx(path, take)
 
 
-def write_usd(path: Path, camera: bool = False) -> None:
+def write_usd(path: Path, camera: bool = False, deform_bones: bool = False) -> None:
     """Write the active scene as a USD crate: z up, metres, skeleton, blend shapes, preview
     materials.
 
+    :param deform_bones: leave out bones that deform nothing, and carry none that do.
     :raises OSError: when the file is incomplete.
     :raises OutputError: Blender cannot write it.
     """
@@ -169,7 +170,7 @@ def write_usd(path: Path, camera: bool = False) -> None:
             visible_objects_only=False,
             export_animation=True,
             export_armatures=True,
-            only_deform_bones=False,
+            only_deform_bones=deform_bones,
             export_shapekeys=True,
             export_uvmaps=True,
             export_normals=True,
