@@ -247,15 +247,15 @@ def _pose_leaps(motion: Motion) -> BoolArray:
     """Return the frames (T,) before and after a step in which all keypoints together move far more
     than in those near it, where a moment is left out of footage of a camera that stays.
 
-    With rays d = R_world_camera K⁻¹ (u, v, 1), the keypoints move by the mean of z |Δd|, z the
-    depth of the pelvis. A limb that is mistaken for another one is a small part of that.
+    With rays d = R_world_camera ((u - c_x) / f_x, (v - c_y) / f_y, 1), the keypoints move by the
+    mean of z |Δd|, z the depth of the pelvis. A limb that is mistaken for another one is a small
+    part of that.
     """
     times = motion.times_with_gaps
-    pixels = motion.keypoints2d[..., :2].astype(float)
-    homogeneous = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=-1)
-    R_world_camera = motion.world_from_camera[:, None, :3, :3]
-    K_inverse = np.linalg.inv(motion.intrinsics_of_frames)[:, None]
-    rays = (R_world_camera @ K_inverse @ homogeneous[..., None])[..., 0]
+    K = motion.intrinsics_of_frames[:, None]
+    flat = (motion.keypoints2d[..., :2] - K[..., :2, 2]) / K[..., (0, 1), (0, 1)]
+    lines = np.concatenate([flat, np.ones_like(flat[..., :1])], axis=-1)
+    rays = lines @ np.swapaxes(motion.world_from_camera[:, :3, :3], 1, 2)
     depth = motion.joints_cam[1:, _AT["pelvis"], 2]
     moved_m = depth[:, None] * np.linalg.norm(np.diff(rays, axis=0), axis=-1)
     is_sure = (motion.keypoints2d[..., 2] > _SURE_KEYPOINT) & motion.valid[:, None]

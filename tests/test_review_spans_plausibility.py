@@ -203,6 +203,13 @@ def test_a_pose_that_is_another_one_from_one_frame_to_the_next_is_found() -> Non
     assert not implausible(seen_at(moves))["leap"].any()
 
 
+def test_a_file_s_intrinsics_need_no_inverse() -> None:
+    """Focal lengths and sides above 0 are all that a motion file must have."""
+    singular = WALK.intrinsics.copy()
+    singular[2, 2] = 0.0
+    assert not implausible(replace(WALK, intrinsics=singular))["leap"].any()
+
+
 def boxing() -> np.ndarray:
     """Both hands strike in turn, 0.6 m at 10 m/s, with the elbows half as far."""
     at = joints_in_world(WALK)
