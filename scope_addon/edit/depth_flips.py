@@ -26,8 +26,8 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.rotations import exp, log, shortest_turn
-from ..arrays import Float64Array, FloatArray, IndexArray
-from ..kinematics.axes import UP, transposed, unit
+from ..arrays import Float64Array, FloatArray, IndexArray, unit_vectors
+from ..kinematics.axes import UP, transposed
 from ..kinematics.mirrored_limbs import LIMBS, other_side
 from .clip import Clip
 from .corrections import BODY, DepthFlip
@@ -101,10 +101,10 @@ def _turned_around(clip: Clip, body: Body, centers: Float64Array) -> Float64Arra
     """Return the rotations (T, K+1, 3, 3) of a body that is mirrored in depth."""
     names = body.joint_names
     opposite = [names.index(other_side(name)) for name in names]
-    sight = unit(clip.root - centers)
+    sight = unit_vectors(clip.root - centers)
     level = sight - (sight @ UP)[:, None] * UP
     is_level = np.linalg.norm(level, axis=1, keepdims=True) > _LEAST_HORIZONTAL
-    v = unit(np.where(is_level, level, sight))
+    v = unit_vectors(np.where(is_level, level, sight))
     M = np.eye(3) - 2.0 * v[:, :, None] * v[:, None, :]
     rotations: Float64Array = SIDES_EXCHANGED @ clip.rotations[:, opposite] @ SIDES_EXCHANGED
     rotations[:, 0] = M @ clip.rotations[:, 0] @ SIDES_EXCHANGED
@@ -160,13 +160,13 @@ def _on_ray(
     :param bone: (T, 3) the bone as it was.
     :param mirrored: whether the bone shall point to the other side of its start.
     """
-    ray = unit(joint)
+    ray = unit_vectors(joint)
     nearest = (ray * start).sum(axis=1)
     off = (bone**2).sum(axis=1) - ((start**2).sum(axis=1) - nearest**2)
     half = np.sqrt(np.maximum(off, 0.0))  # a bone too short for its ray points to it
     side = np.where((ray * bone).sum(axis=1) >= 0.0, 1.0, -1.0) * (-1.0 if mirrored else 1.0)
     depth = np.maximum(nearest + side * half, _NEAREST_M)
-    direction = unit(depth[:, None] * ray - start)
+    direction = unit_vectors(depth[:, None] * ray - start)
     return start + np.linalg.norm(bone, axis=1, keepdims=True) * direction
 
 
@@ -181,7 +181,9 @@ def _turned_bones(
     :param rotations: of the upper and the lower bone, global, (T, 3, 3) each.
     :param hinge: (3,) the axis about which the limb bends, in the axes of both bones.
     """
-    normals = [np.cross(unit(upper), unit(lower)) for upper, lower in (before, after)]
+    normals = [
+        np.cross(unit_vectors(upper), unit_vectors(lower)) for upper, lower in (before, after)
+    ]
     bent = np.minimum(*(np.linalg.norm(normal, axis=1) for normal in normals))
     share = np.clip((bent - _BENDS[0]) / (_BENDS[1] - _BENDS[0]), 0.0, 1.0)
     off_upper = _angle_about(before[0], rotations[0] @ hinge, normals[0])
@@ -191,7 +193,7 @@ def _turned_bones(
         turn = shortest_turn(old, new)
         off = _angle_about(old, R @ hinge, normals[0]) - wrong
         angle = share * (_angle_about(new, turn @ R @ hinge, normals[1]) - off)
-        turned.append(exp(angle[:, None] * unit(new)) @ turn @ R)
+        turned.append(exp(angle[:, None] * unit_vectors(new)) @ turn @ R)
     return turned[0], turned[1]
 
 
@@ -199,7 +201,7 @@ def _angle_about(axis: Float64Array, start: Float64Array, end: Float64Array) -> 
     """Return the angles (T,), −π to π, by which directions (T, 3) turn about an axis (T, 3) to
     others.
     """
-    axis = unit(axis)
+    axis = unit_vectors(axis)
     across = np.cross(axis, start)
     sine = (across * end).sum(axis=1)
     cosine = (np.cross(across, axis) * end).sum(axis=1)

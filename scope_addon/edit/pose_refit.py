@@ -46,9 +46,8 @@ from ...solver.body import Body
 from ...solver.measurements import SIGMA_3D
 from ...solver.residuals import joint_limits
 from ...solver.tree import with_fixed_shape
-from ..arrays import Float64Array, FloatArray
+from ..arrays import Float64Array, FloatArray, unit_vectors
 from ..errors import UsageError
-from ..kinematics.axes import unit
 from ..kinematics.contact_points import SOLES, with_contact_points
 from ..kinematics.foot_skin import UNDER_FLOOR_M, FootSkin
 
@@ -327,7 +326,7 @@ def _ray(camera: Camera, pixel: Float64Array) -> Float64Array:
     """Return the unit vector (3,), world, from a camera to what it sees in a pixel (2,)."""
     T, K = camera
     ray = T[:3, :3] @ np.linalg.solve(K, np.array([*pixel, 1.0]))
-    return unit(ray)
+    return unit_vectors(ray)
 
 
 def point_at_depth(camera: Camera, pixel: Float64Array, point: Float64Array) -> Float64Array:

@@ -78,8 +78,3 @@ def unscaled(matrices: FloatArray) -> Float64Array:
     """
     U, _, Vt = np.linalg.svd(matrices)
     return U @ Vt
-
-
-def unit(vectors: FloatArray) -> Float64Array:
-    """Return the directions (..., 3) of vectors; zeros stay zeros."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)

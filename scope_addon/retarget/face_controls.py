@@ -26,8 +26,7 @@ import numpy as np
 
 from ...solver.errors import InputError
 from ...solver.rotations import exp
-from ..arrays import Float64Array, FloatArray
-from ..kinematics.axes import unit
+from ..arrays import Float64Array, FloatArray, unit_vectors
 from .expression_map import MOVED, TURNED, ExpressionMap, load_expression_map, weighted_sum
 from .rest_pose import BoneMotion
 
@@ -129,7 +128,7 @@ def _around(
     :param turned: (T, 3) degrees about left, up and forward.
     """
     seen = frame.axes.T @ (target - eye)
-    ahead = unit(seen)
+    ahead = unit_vectors(seen)
     left = np.array([1.0, 0.0, 0.0]) - ahead[0] * ahead
     axes = np.stack([left, np.cross(ahead, left), ahead], axis=1)
     return exp(np.radians(turned) @ axes.T) @ seen - seen

@@ -10,8 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..arrays import Float64Array
-from ..kinematics.axes import unit
+from ..arrays import Float64Array, unit_vectors
 from .bone_map import FINGERS
 from .rest_pose import RestPose
 
@@ -136,7 +135,7 @@ def _by_geometry(rest: RestPose, wrist: int, below: list[int]) -> dict[str, list
         not _PHALANGES <= len(chain) <= _PHALANGES + 2 for chain in chains
     ):
         return {}
-    along = unit(np.array([heads[chain[-1]] - heads[chain[0]] for chain in chains]))
+    along = unit_vectors(np.array([heads[chain[-1]] - heads[chain[0]] for chain in chains]))
     thumb = int((along @ along.sum(axis=0)).argmin())
     middles = np.array([heads[chain].mean(axis=0) for chain in chains])
     order = np.argsort(np.linalg.norm(middles - middles[thumb], axis=1), kind="stable")

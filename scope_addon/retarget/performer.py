@@ -21,9 +21,9 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.rotations import log, shortest_turn
-from ..arrays import Float64Array
+from ..arrays import Float64Array, unit_vectors
 from ..errors import MotionFileError
-from ..kinematics.axes import R_WORLD_MODEL, UP, rotated, transposed, unit
+from ..kinematics.axes import R_WORLD_MODEL, UP, rotated, transposed
 from ..kinematics.frame_blocks import by_blocks
 from ..kinematics.smoothing import interpolate_rotations
 from ..notices import Notice, notice
@@ -259,7 +259,7 @@ def _limbs(
         chosen = points[:, joints]
     trunk = chosen[:, :1] - chosen[:, 1:3].mean(axis=1, keepdims=True)
     along = np.concatenate([trunk, chosen[:, 1:3] - chosen[:, 3:]], axis=1)
-    return unit(along)
+    return unit_vectors(along)
 
 
 def _of_parts(turns: Float64Array, part_of: list[str], body: Body) -> Float64Array:

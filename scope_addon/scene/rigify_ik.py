@@ -19,7 +19,7 @@ import numpy as np
 from bpy.types import Object
 from mathutils import Matrix
 
-from ..kinematics.axes import unit
+from ..arrays import unit_vectors
 from ..retarget.rest_pose import BoneMotion
 from .rig_probe import basis_of
 
@@ -185,7 +185,7 @@ def _place_pole(rig: Object, limb: _Limb, base: Matrix, bases: dict[str, list[Ma
     line = last - first
     axis = axis - line * (axis @ line) / max(float(line @ line), 1e-12)
     length = posed[limb.fk[0]].length + posed[limb.fk[1]].length
-    place = middle + unit(axis) * length
+    place = middle + unit_vectors(axis) * length
     rest = rig.data.bones[limb.pole].matrix_local
     _set(rig, limb.pole, Matrix.LocRotScale(place.tolist(), rest.to_quaternion(), None), bases)
 
