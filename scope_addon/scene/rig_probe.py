@@ -330,9 +330,11 @@ def _twins(rig: Object, names: Sequence[str]) -> dict[str, int]:
     """Return the other bones that move skin and are where a bone is at rest, with its row."""
     bones = rig.data.bones
     places = np.array([[*bones[name].head_local, *bones[name].tail_local] for name in names])
+    skins = [obj for obj in bpy.context.scene.objects if is_deformed_by(obj, rig)]
+    skinned = {group.name for skin in skins for group in skin.vertex_groups}
     twins = {}
     for bone in bones:
-        if bone.use_deform and bone.name not in names:
+        if bone.use_deform and bone.name in skinned and bone.name not in names:
             off = np.abs(places - [*bone.head_local, *bone.tail_local]).max(axis=1)
             if off.min() < _SAME_PLACE * np.ptp(places):
                 twins[bone.name] = int(off.argmin())

@@ -366,6 +366,11 @@ def with_deform_bones(rig):
         constraint = rig.pose.bones[f"DEF_{name}"].constraints.new("COPY_TRANSFORMS")
         constraint.target = rig
         constraint.subtarget = name
+    bpy.ops.mesh.primitive_cube_add()
+    skin = bpy.context.object
+    skin.modifiers.new("Armature", "ARMATURE").object = rig
+    for name in names:
+        skin.vertex_groups.new(name=f"DEF_{name}")
     bpy.context.view_layer.update()
 
 
@@ -389,6 +394,10 @@ def test_bones_that_carry_the_skin_and_do_not_follow_those_in_the_list_are_repor
     (warning,) = run(source, rig).warnings
     assert warning.code == "blocked_bones"
     assert warning.values["bones"] == [thigh.name]
+    skin = bpy.data.objects["Cube"]
+    # As goals of IK, it now carries no skin, whatever its settings say.
+    skin.vertex_groups.remove(skin.vertex_groups[thigh.name])
+    assert run(source, rig).warnings == []
 
 
 def test_bones_blocked_by_a_constraint_are_reported(source):
