@@ -83,6 +83,7 @@ FORMATS = (
 _OF_MOTION = ("NPZ", "TRC", "MOT", "C3D", "VRMA")
 _NO_USD = "This Blender was built without USD; use a build from blender.org, or another format"
 _SUFFIX = {key: f".{key.lower()}" for key, *_ in FORMATS}
+_FORMAT_OF = {suffix: key for key, suffix in _SUFFIX.items()}
 
 
 @with_options(Place.EXPORT)
@@ -169,6 +170,12 @@ class SCOPE_OT_export(SavingOperator):
         """Return that of the format."""
         return _SUFFIX[self.format]
 
+    def check(self, context: Context) -> bool:
+        """Let a suffix that is typed choose the format; complete other names."""
+        before = self.format
+        self.format = _FORMAT_OF.get(Path(self.filepath).suffix.lower(), before)
+        return SavingOperator.check(self, context) or self.format != before
+
     def draw(self, context: Context) -> None:
         """Draw the options in the sidebar of the file browser."""
         layout = split(self.layout)
@@ -190,11 +197,10 @@ class SCOPE_OT_export(SavingOperator):
             only the command line writes, or there is nothing of what is to be written.
         """
         typed = Path(self.filepath)
-        of_suffix = {suffix: kind for kind, suffix in _SUFFIX.items()}
-        self.format = of_suffix.get(typed.suffix.lower(), self.format)
+        self.format = _FORMAT_OF.get(typed.suffix.lower(), self.format)
         path = output_file(self.filepath, self.suffix())
-        if typed.suffix.lower() in set(SUFFIXES).difference(of_suffix):
-            check_output(typed, tuple(of_suffix))
+        if typed.suffix.lower() in set(SUFFIXES).difference(_FORMAT_OF):
+            check_output(typed, tuple(_FORMAT_OF))
         _check_available(self.format)
         warnings: list[Notice] = []
         options = self._options(warnings)

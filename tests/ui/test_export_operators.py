@@ -60,6 +60,20 @@ def test_the_suffix_that_is_typed_decides_the_format(tmp_path, name):
     assert path.read_bytes().startswith(starts[path.suffix.lower()])
 
 
+@pytest.mark.parametrize(
+    ("typed", "path", "form"),
+    [
+        *[("/a/walk.fbx", "/a/walk.fbx", "FBX"), ("/a/walk.GLB", "/a/walk.GLB", "GLB")],
+        *[("/a/walk", "/a/walk.glb", "GLB"), ("/a/walk.v2", "/a/walk.v2.glb", "GLB")],
+    ],
+)
+def test_the_file_browser_keeps_the_suffix_of_another_format_that_is_typed(typed, path, form):
+    browsed = SimpleNamespace(filepath=typed, format="GLB")
+    browsed.suffix = lambda: SCOPE_OT_export.suffix(browsed)
+    assert SCOPE_OT_export.check(browsed, None) == (typed != path or form != "GLB")
+    assert (browsed.filepath, browsed.format) == (path, form)
+
+
 def test_a_dot_in_a_name_is_no_format_and_formats_of_the_command_line_are_refused(tmp_path):
     captured_with(motion_of(walk(0.2)))
     (tmp_path / "out").mkdir()
