@@ -41,7 +41,8 @@ SLOWEST = 1e-4
 FASTEST = 10_000.0
 _POSITIVE = (float(np.finfo(float).tiny), float(np.finfo(float).max))
 _ORTHONORMAL = 0.01  # largest deviation of RᵀR from the identity
-# Radians, of an axis-angle vector. Half a turn reaches every pose, but fits leave a whole one.
+# Radians, of an axis-angle vector. Half a turn reaches every pose, but fits leave a whole one, and
+# as many for the root as somebody spins about the up axis.
 _LARGEST_TURN = 4.0 * np.pi
 FARTHEST_M = 1e5  # from the origin; a number beyond that is not in metres
 
@@ -409,7 +410,7 @@ def _axis_angles(array: NDArray[Any], what: str, *, w_last: bool) -> Float32Arra
     if values.ndim == 2 and values.shape[1] and values.shape[1] % 3 == 0:
         values = values.reshape(len(values), -1, 3)
     if values.ndim == 3 and values.shape[2] == 3 and values.shape[1]:
-        largest = float(np.linalg.norm(values, axis=-1).max())
+        largest = float(np.linalg.norm(values[:, 1:], axis=-1).max(initial=0.0))
         if largest > _LARGEST_TURN:
             raise MotionFileError(
                 f"{what} holds axis-angle vectors of up to {largest:.4g} radians, several turns, "

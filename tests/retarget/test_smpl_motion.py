@@ -157,6 +157,17 @@ def test_other_arrays_may_hold_anything(tmp_path):
     assert len(read_one(tmp_path / "walk.npz")) == T
 
 
+def test_somebody_may_spin_many_times():
+    """About the up axis: a fit that starts from the frame before adds up the turns."""
+    poses = RANDOM[:, :24].copy()
+    poses[:, 0] = np.linspace(0.0, 20.0 * np.pi, T)[:, None] * [0.0, 1.0, 0.0]
+    for arrays in (
+        {"smpl_poses": poses.reshape(T, -1)},
+        {"global_orient": poses[:, :1], "body_pose": poses[:, 1:]},
+    ):
+        np.testing.assert_allclose(smpl_motion(arrays, FILE).poses, poses, rtol=1e-6)
+
+
 def with_nan() -> np.ndarray:
     poses = flat(0, 24).copy()
     poses[3, 7] = np.nan
