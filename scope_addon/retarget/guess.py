@@ -420,7 +420,7 @@ def by_geometry(rest: RestPose) -> dict[str, str]:
     central = np.flatnonzero(abs(leftwards) < 0.1).tolist() or leaves
     highest = max(upwards[bone] for bone in central)
     ends["head"] = [bone for bone in central if upwards[bone] >= _HIGH * highest]
-    person = _person(rest, list(ends.values()))
+    person = _person(rest, ends)
     for limb, bones in ends.items():
         ends[limb] = [bone for bone in bones if person in rest.chains[bone]] or bones
     chains: dict[str, list[int]] = {}
@@ -501,20 +501,33 @@ def _limb_ends(
     return ends
 
 
-def _person(rest: RestPose, ends: list[list[int]]) -> int:
+def _person(rest: RestPose, ends: Mapping[str, list[int]]) -> int:
     """Return the bone that carries most of limbs and head: of those, one that is called FK, or the
-    deepest, as a rig may have the same person several times.
+    deepest, as a rig may have the same person several times. What hangs down to the feet from the
+    chest, as a coat does, has more bones than the legs, and is none.
 
     :param ends: the bones at which each of them may end.
     """
-    carried: list[set[int]] = [set() for _ in rest.names]
-    for limb, bones in enumerate(ends):
+    carried: list[set[str]] = [set() for _ in rest.names]
+    for limb, bones in ends.items():
         for bone in bones:
             for above in rest.chains[bone]:
                 carried[above].add(limb)
+    most = max(map(len, carried))
+    legs: dict[int, int] = {}  # the number of bones down to the nearest foot of each person
+    for foot in (*ends["left leg"], *ends["right leg"]):
+        chain = rest.chains[foot]
+        person = next((bone for bone in reversed(chain) if len(carried[bone]) == most), None)
+        if person is not None:
+            legs[person] = min(len(chain), legs.get(person, len(chain)))
+    found = [
+        bone
+        for bone, length in legs.items()
+        if all(legs.get(above, length) >= length for above in rest.chains[bone])
+    ]
     is_fk = [name.is_fk for name in parse_names(rest.names)]
     return max(
-        range(len(rest.names)),
+        found or range(len(rest.names)),
         key=lambda bone: (len(carried[bone]), is_fk[bone], len(rest.chains[bone])),
     )
 

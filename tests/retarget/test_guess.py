@@ -120,6 +120,21 @@ def test_a_tail_does_not_tell_the_sides() -> None:
     assert guess(rest).parts == part_of
 
 
+def test_a_coat_down_to_the_feet_is_no_legs() -> None:
+    """It hangs from the neck: with it for legs, the chest would carry a whole person."""
+    bones, part_of = bones_of("nameless", drop=0.8)
+    neck = bones.names.index(names_of("nameless")["neck"])
+    names = [*bones.names]
+    parents = [*bones.parents]
+    heads = [*bones.heads]
+    for x in (-0.2, -0.1, 0.0, 0.1, 0.2):
+        for k in range(8):
+            parents.append(len(names) - 1 if k else neck)
+            names.append(f"coat{len(names)}")
+            heads.append(bones.heads[neck] + [x, 0.15 + 0.05 * k, -0.18 * k])
+    assert guess(RestPose(names, np.array(parents), np.array(heads))).parts == part_of
+
+
 @pytest.mark.parametrize("angle", np.radians([0, 80, 135, 180, 300]))
 def test_names_tell_the_sides_of_a_rig_without_toes(angle: float) -> None:
     """Names that tell nothing but the side."""
