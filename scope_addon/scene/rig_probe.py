@@ -260,8 +260,8 @@ def _check_rotated(rig: Object, names: list[str], turned: Float64Array) -> None:
     if blocked:
         raise InputError(
             f"'{blocked[0]}' of '{rig.name}' does not move when it is rotated: show the rig in the "
-            f"viewport, mute {_controlling(rig, blocked[:1]) or _UNKNOWN}, or remove it from the "
-            "list"
+            f"viewport, mute {_controlling(rig, blocked[:1]) or _UNKNOWN}, or remove the bone from "
+            "the list"
         )
 
 
@@ -282,12 +282,12 @@ def _check_root_moves(rig: Object, name: str) -> None:
     if bone.bone.use_connect:
         raise InputError(
             f"'{name}' of '{rig.name}' is connected to '{bone.parent.name}' and cannot move away "
-            "from it: in Edit "
-            "Mode, disconnect the bone (Alt P)"
+            "from it: in Edit Mode, disconnect the bone (Alt P)"
         )
     raise InputError(
         f"'{name}' of '{rig.name}' does not move when its location changes: mute "
-        f"{_controlling(rig, [name]) or _UNKNOWN}, or choose another one for the pelvis in the list"
+        f"{_controlling(rig, [name]) or _UNKNOWN}, or choose another bone for the pelvis in the "
+        "list"
     )
 
 
