@@ -41,7 +41,8 @@ UNSURE_LENS = 0.15
 # five that were converted from lower rates, 18 % and more.
 REPEATED_CHANGE = 0.2
 REPEATED_WITHIN_S = 0.15
-REPEATED_SHARE = 0.1  # of the frames
+REPEATED_SHARE = 0.1  # of the frames in which something moves
+MOVING_CHANGE = 15.0  # of 255; around somebody who stands, compression mostly changes less
 FEWEST_STEPS = 20
 REPEATS_OFF = 0.15  # error of the mean number of frames that show one moment
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen
@@ -203,21 +204,22 @@ def repetition_warnings(name: str, fps: float, changes: Float64Array) -> list[No
     picture stands still in these, apart from what compression changes, and leaps in the others.
 
     :param fps: of the captured frames.
-    :param changes: (T,) of the picture from the frame before, in any unit.
+    :param changes: (T,) of the picture from the frame before, see `SceneCuts`.
     """
     changes = changes[1:]
     count = len(changes)
-    if count < FEWEST_STEPS:
-        return []
     reach = max(2, round(REPEATED_WITHIN_S * fps))
     largest = sliding_window_view(np.pad(changes, reach), reach).max(axis=1)
     around = np.minimum(largest[:count], largest[reach + 1 :])
-    repeats = changes < REPEATED_CHANGE * around
-    if repeats.mean() < REPEATED_SHARE:
-        return []
     # Where nothing moves, a repeated frame looks like any other.
-    moves = np.maximum(around, changes) > np.median(changes[repeats]) / REPEATED_CHANGE
+    repeats = (changes < REPEATED_CHANGE * around) & (around > MOVING_CHANGE)
+    if not repeats.any():
+        return []
+    least = max(MOVING_CHANGE, np.median(changes[repeats]) / REPEATED_CHANGE)
+    moves = np.maximum(around, changes) > least
     share = (repeats & moves).sum() / moves.sum()
+    if moves.sum() < FEWEST_STEPS or share < REPEATED_SHARE:
+        return []
     # Every k-th frame shows another moment than the one before; a rate between would repeat some.
     every = max(2, int(np.ceil(1.0 / (1.0 - share) - REPEATS_OFF)))
     return [notice("repeated_frames", footage=name, percent=100.0 * share, rate=fps / every)]

@@ -108,8 +108,8 @@ def test_warnings_about_every_video_are_said_once():
             video=SimpleNamespace(path=f"{name}.mp4", recorded_speed=speed, fps=30),
         )
         for name, warnings, speed, changes in (
-            ("b", [damaged, slower], 1.0, [0.0, 9.0] * 20),
-            ("c", [slower], 8.0, [9.0] * 40),
+            ("b", [damaged, slower], 1.0, [0.0, 90.0] * 20),
+            ("c", [slower], 8.0, [90.0] * 40),
         )
     ]
     found = several._about_footage(views, CaptureOptions(), [slower])
