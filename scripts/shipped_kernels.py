@@ -27,6 +27,7 @@ ROOT = Path(__file__).resolve().parent.parent
 KEPT = ROOT / "build" / "kernels"
 DEBIAN_READY = ROOT / "build" / "blender" / "ready"
 MADE_FROM = "made_from"  # the file that says what the machine code was made from
+_COMPILED = b"solver.kernel import"  # in each file of the extension that has kernels
 PROCESSORS = {"windows-x64": "x86-64-v3", "linux-x64": "x86-64-v3", "macos-arm64": "apple-m1"}
 _THIS = {
     ("Windows", "AMD64"): "windows-x64",
@@ -186,7 +187,12 @@ def _numpy_wheel(python: str) -> Path:
 def _digest(staging: Path, wheels: list[Path]) -> str:
     """Return a digest of what decides the machine code: the sources and the compiler."""
     digest = hashlib.sha256("\n".join(sorted(w.name for w in wheels)).encode())
-    for folder in ("solver", "scope_addon/machine_code", "scope_addon/capture/overlay"):
-        for path in sorted((staging / folder).rglob("*.py")):
-            digest.update(path.relative_to(staging).as_posix().encode() + b"\n" + path.read_bytes())
+    contents = {
+        path.relative_to(staging).as_posix(): path.read_bytes()
+        for folder in ("solver", "scope_addon")
+        for path in (staging / folder).rglob("*.py")
+    }
+    for name, content in sorted(contents.items()):
+        if name.startswith(("solver/", "scope_addon/machine_code/")) or _COMPILED in content:
+            digest.update(name.encode() + b"\n" + content)
     return digest.hexdigest()

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from .script_modules import script
+from .script_modules import ROOT, script
 
+RASTERIZER = "scope_addon/capture/fitting/rasterizer.py"  # of the extension, with kernels
 WHEELS = [
     Path("numba-0.68.1-cp313-cp313-win_amd64.whl"),
     Path("numba-0.68.1-cp311-cp311-win_amd64.whl"),
@@ -22,10 +23,12 @@ def shipped(tmp_path, monkeypatch):
 
 @pytest.fixture
 def staging(tmp_path):
-    for name in ("solver/fit.py", "scope_addon/capture/overlay/draw.py", "scope_addon/ui/panel.py"):
+    for name in ("solver/fit.py", RASTERIZER, "scope_addon/ui/panel.py"):
         path = tmp_path / "staging" / name
         path.parent.mkdir(parents=True)
-        path.write_text("# a source\n")
+        path.write_bytes(
+            (ROOT / RASTERIZER).read_bytes() if name == RASTERIZER else b"# a source\n"
+        )
     return tmp_path / "staging"
 
 
@@ -46,11 +49,12 @@ def test_code_made_elsewhere_is_shipped(shipped, staging):
     assert (staging / "assets" / "kernels" / code).read_text("utf-8") == "code"
 
 
-@pytest.mark.parametrize("changed", ["solver/fit.py", "scope_addon/capture/overlay/draw.py"])
+@pytest.mark.parametrize("changed", ["solver/fit.py", RASTERIZER])
 def test_code_of_other_sources_is_not_shipped(shipped, staging, changed, capsys, monkeypatch):
     monkeypatch.setattr(shipped, "_THIS", {})  # this computer is of no platform
     keep(shipped, staging, WHEELS[:1])
-    (staging / changed).write_text("# changed\n")
+    with (staging / changed).open("a") as source:
+        source.write("# changed\n")
     assert not shipped.add_kernels(staging, "windows-x64", "3.13", WHEELS)
     assert not (staging / "assets").exists()
     assert "no compiled code for windows-x64, Python 3.13" in capsys.readouterr().err
