@@ -18,7 +18,8 @@ ankle follows from either point i, heel or ball:
     E     D, but a foot that is longer than the body's, scaled, is pitched less: otherwise its ankle
           would rise too far for its leg
     h     from t times the body's hip to the rig's, on the floor: so legs have the directions of the
-          body's, however wide the hips are; constant, or nearly so, while the foot rests
+          body's, however wide the hips are; constant, or nearly so, while the foot rests. Of a
+          single frame, it points to the side of the foot, which turns less than the pelvis
 
 So a point that is at rest on the body is at rest on the rig. On a flat foot both goals are the
 same: h from t times the body's ankle, at the height of the rig's ankle; so a longer foot extends at
@@ -35,7 +36,7 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.rotations import exp, shortest_turn
-from ..arrays import BoolArray, Float64Array, FloatArray
+from ..arrays import BoolArray, Float64Array, FloatArray, unit_vectors
 from ..edit.clip import Clip, about_z
 from ..kinematics.axes import UP, rotated, transposed
 from ..kinematics.foot_skin import FootSkin, lower_floors
@@ -252,6 +253,10 @@ def _stance(
     :param times: (T,) seconds.
     """
     offset = (heads[:, legs.hips] - legs.scales * joints[:, legs.sockets]) * _LEVEL
+    if len(times) == 1:  # as of a live capture, where a foot that rests is told by no other frame
+        sideways = unit_vectors(turns[..., 0] * _LEVEL)
+        across = (offset * sideways).sum(axis=-1, keepdims=True)
+        return sideways * np.copysign(np.linalg.norm(offset, axis=-1, keepdims=True), across)
     stands = [
         # A foot that is slow at any height may be held there, too.
         standing_probability(point, UP, times, uneven_ground=True)

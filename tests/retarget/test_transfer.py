@@ -138,13 +138,19 @@ def proportioned(hips: float, legs: float, feet: float) -> Skeleton:
     ("hips", "legs", "feet"),
     [(2.2, 1.0, 1.0), (1.0, 0.45, 1.0), (1.8, 0.5, 1.2), (1.5, 0.6, 0.6), (0.3, 1.3, 1.0)],
 )
+@pytest.mark.parametrize("is_live", [False, True])
 def test_legs_of_other_proportions_point_where_the_bodys_do_and_their_feet_stay_in_place(
-    hips: float, legs: float, feet: float
+    hips: float, legs: float, feet: float, is_live: bool
 ) -> None:
-    """Though the pelvis, and the hips with it, turns with every step."""
+    """Though the pelvis, and the hips with it, turns with every step; of a whole clip, or frame by
+    frame.
+    """
     clip, stands = rolling_walk(pelvis_turn=8.0)
     rig = proportioned(hips, legs, feet)
-    heads = Transfer(BODY, BETAS, rig, same_names()).pose(clip).heads
+    transfer = Transfer(BODY, BETAS, rig, same_names())
+    frames = zip(clip.times, clip.rotations, clip.root, strict=True)
+    clips = [Clip(*(part[None] for part in frame)) for frame in frames] if is_live else [clip]
+    heads = np.concatenate([transfer.pose(each).heads for each in clips])
     joints = clip.joints(BODY, BETAS)[:, [NAMES.index(name) for name in MAPPED]]
     for side, contact in stands.items():
         for first, second in ((f"{side}_hip", f"{side}_knee"), (f"{side}_knee", f"{side}_ankle")):
