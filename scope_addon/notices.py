@@ -50,9 +50,9 @@ SENTENCES = {
     "has its true speed; capture with --speed 1 for the speed at which it plays",
     "frame_rate_above_footage": "{footage} has {rate:g} frames per second; {wanted:g} would "
     "repeat some, so each was used once",
-    "uneven_frames": "{footage} has {rate:.5g} frames per second, of which {wanted:.5g} are not "
-    "evenly apart. The keys have the exact times of its frames, so some lie between the scene's "
-    "frames; --fps {even:.5g} takes frames that are",
+    "uneven_frames": "{footage} has {rate:.5g} frames per second, so {wanted:.5g} per second "
+    "cannot be evenly spaced. The keys have the exact times of its frames, so some lie between the "
+    "scene's frames; with --fps {even:.5g} they are evenly spaced",
     "repeated_frames": "{percent:.0f} % of the frames of {footage} repeat the one before, as after "
     "a conversion to a higher frame rate, so the motion is jerky; capture with --fps {rate:g} on "
     "the command line",

@@ -100,9 +100,9 @@ def test_frames_that_are_not_evenly_apart_are_said(
         steps_s = np.diff([frame.timestamp_s for frame in video])
     assert np.allclose(steps_s, float(1 / Fraction(fps)), atol=1e-6) == (even == 0)
     assert [str(each) for each in video.warnings] == [
-        f"{long_video.name} has 25 frames per second, of which {fps} are not evenly apart. The "
-        "keys have the exact times of its frames, so some lie between the scene's frames; "
-        f"--fps {even:g} takes frames that are"
+        f"{long_video.name} has 25 frames per second, so {fps} per second cannot be evenly spaced. "
+        "The keys have the exact times of its frames, so some lie between the scene's frames; "
+        f"with --fps {even:g} they are evenly spaced"
     ] * (even > 0)
 
 
