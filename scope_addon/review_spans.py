@@ -43,8 +43,9 @@ FLOATING_M = 0.25  # of both ankles' height above that at which they stand
 FLOATING_S = 1.2  # a jump of 1.7 m
 LEAP_M_S = 8.0  # across the line of sight; in 40 captures without a leap, below 6
 LEAP_S = 0.3  # within which the body is less than half as fast before it, and after it
-# Of a leap's step, across the line of sight. The mean of all keypoints moves by at most 0.07 m more
-# than in any step near it in 60 captures without a leap, and by 0.2 m and more in six with one.
+# Of a leap, across the line of sight. In a step, the mean of all keypoints moves by at most 0.07 m
+# more than in any step near it in 60 captures without a leap, and by 0.2 m and more in six with
+# one.
 LEAP_M = 0.15
 POSE_LEAP_M_S = 3.0
 _SURE_KEYPOINT = 0.5  # confidence
@@ -232,14 +233,18 @@ def _leaps(motion: Motion, pelvis: Float64Array) -> BoolArray:
     sight = unit_vectors(pelvis - motion.world_from_camera[:, :3, 3])
     steps = np.diff(pelvis, axis=0)
     across = steps - (steps * sight[1:]).sum(axis=1, keepdims=True) * sight[1:]
-    moved_m = np.linalg.norm(across, axis=1)
-    speed = moved_m / np.diff(times)
+    speed = np.linalg.norm(across, axis=1) / np.diff(times)
     is_seen = motion.valid[1:] & motion.valid[:-1]
     found = np.zeros(len(motion), bool)
-    for k in np.flatnonzero((speed > LEAP_M_S) & (moved_m > LEAP_M) & is_seen):
+    for k in np.flatnonzero((speed > LEAP_M_S) & is_seen):
         before, after = _near_steps(times, speed, k)
-        if all(len(others) and others.min() < 0.5 * speed[k] for others in (before, after)):
-            found[k : k + 2] = True
+        if not all(len(others) and others.min() < 0.5 * speed[k] for others in (before, after)):
+            continue
+        # at high rates, smoothing spreads a leap over several frames
+        slow = np.flatnonzero(np.r_[True, speed < 0.5 * speed[k], True])
+        number = np.searchsorted(slow, k + 1)
+        leap = across[slow[number - 1] : slow[number] - 1].sum(axis=0)
+        found[k : k + 2] |= np.linalg.norm(leap) > LEAP_M
     return found
 
 

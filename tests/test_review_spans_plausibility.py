@@ -242,9 +242,26 @@ def test_what_a_body_can_do_is_no_leap(acting: Callable[[], np.ndarray]) -> None
     assert not implausible(seen_at(acting()))["leap"].any()
 
 
+def standing(shift_m: np.ndarray, fps: float) -> Motion:
+    """Somebody who stands, and is shifted sideways by (T,)."""
+    at = np.repeat(joints_in_world(WALK)[:1], len(WALK), axis=0)
+    at[..., 0] += shift_m[:, None]
+    joints = WALK.joints_cam.astype(float)
+    T = WALK.world_from_camera
+    joints[:, : at.shape[1]] = (at - T[:, None, :3, 3]) @ T[:, :3, :3]
+    timestamps = np.arange(len(WALK)) / fps
+    return replace(WALK, joints_cam=joints.astype(np.float32), timestamps=timestamps)
+
+
 def test_a_small_step_at_a_high_rate_is_no_leap() -> None:
     """The fit of a slow-motion clip shifts by 6 cm in one frame, which are 14 m/s."""
-    across = np.zeros((len(WALK), 3))
-    across[90:, 0] = 0.06
-    shifted = moved(dict.fromkeys(AT, across))
-    assert not implausible(replace(shifted, timestamps=np.arange(len(WALK)) / 240))["leap"].any()
+    shift_m = np.where(np.arange(len(WALK)) < 90, 0.0, 0.06)
+    assert not implausible(standing(shift_m, 240.0))["leap"].any()
+
+
+@pytest.mark.parametrize("fps", [60, 120, 240])
+def test_a_leap_that_smoothing_spreads_over_frames_is_found_at_any_rate(fps: int) -> None:
+    """A metre in a tenth of a second."""
+    shift_m = np.clip((np.arange(len(WALK)) - 90) / (0.1 * fps), 0.0, 1.0)
+    found = implausible(standing(shift_m, fps))["leap"]
+    assert np.flatnonzero(found).tolist() == list(range(90, 91 + fps // 10))
