@@ -17,7 +17,7 @@ import numpy as np
 from ...arrays import Float64Array, FloatArray, Uint8Array
 from ...kinematics.face import EXPRESSIONS
 from .landmark_network import KEYPOINT_NAMES
-from .region import Region, box_along, network_input, rotation_towards
+from .region import Region, box_along, image_input, rotation_towards
 from .sessions import Execution, network_path, open_session
 
 INPUT_SIZE = 256
@@ -99,7 +99,7 @@ class FaceNetwork:
 
     def estimate(self, image_rgb: Uint8Array, region: Region) -> FaceEstimate:
         """Estimate the face in a region of an (H, W, 3) uint8 RGB image."""
-        blob = network_input(region.cut(image_rgb, INPUT_SIZE))
+        blob = image_input(region.cut(image_rgb, INPUT_SIZE))
         landmarks, presence = self._session.run(["landmarks", "presence"], {"input": blob})
         points = landmarks.reshape(FACE_POINTS, 3).astype(float) / INPUT_SIZE
         depth = region.side_px * points[:, 2:]

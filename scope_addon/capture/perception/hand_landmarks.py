@@ -16,7 +16,7 @@ import numpy as np
 from ...arrays import Float64Array, Uint8Array
 from .landmark_network import KEYPOINT_NAMES, disagreement
 from .person_detector import decode, make_anchors, merge_overlapping
-from .region import Region, box_along, network_input, rotation_towards
+from .region import Region, box_along, image_input, rotation_towards
 from .sessions import Execution, network_path, open_session
 
 INPUT_SIZE = 224
@@ -113,7 +113,7 @@ class HandNetwork:
 
     def estimate(self, image_rgb: Uint8Array, region: Region) -> HandEstimate:
         """Estimate the hand in a region of an (H, W, 3) uint8 RGB image."""
-        blob = network_input(region.cut(image_rgb, INPUT_SIZE))
+        blob = image_input(region.cut(image_rgb, INPUT_SIZE))
         landmarks, presence, handedness, world = self._session.run(_OUTPUTS, {"input": blob})
         points = landmarks.reshape(HAND_POINTS, 3)[:, :2].astype(float) / INPUT_SIZE
         return HandEstimate(
@@ -143,7 +143,7 @@ class PalmDetector:
         """Return the hands' regions by all palms in a square of an (H, W, 3) uint8 RGB image, the
         best palm first.
         """
-        blob = network_input(square.cut(image_rgb, PALM_INPUT_SIZE))
+        blob = image_input(square.cut(image_rgb, PALM_INPUT_SIZE))
         boxes, scores = self._session.run(["boxes", "scores"], {"input": blob})
         _, values = merge_overlapping(*decode(boxes[0], scores[0, :, 0], self._anchors, threshold))
         return [_in_image(v, square) for v in values]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ....solver.names import BLAZEPOSE
 from ...arrays import Float32Array, Float64Array, FloatArray, Uint8Array
-from .region import MARGIN, Region, network_input, region_from_points
+from .region import MARGIN, Region, image_input, region_from_points
 from .sessions import Execution, network_path, open_session
 
 if TYPE_CHECKING:
@@ -177,7 +177,7 @@ class LandmarkNetwork:
         anyway.
         """
         (logits,) = self._session(self._threads_alone).run(
-            ["mask"], {"input": network_input(region.cut(image_rgb, INPUT_SIZE))} | _WITH_MASK
+            ["mask"], {"input": image_input(region.cut(image_rgb, INPUT_SIZE))} | _WITH_MASK
         )
         return _probability(logits)
 
@@ -196,7 +196,7 @@ class LandmarkNetwork:
             if values is not None and len(values) == _VALUES:
                 return _unpacked(values, region)
         outputs = [*_OUTPUTS, "mask"] if with_mask else _OUTPUTS
-        inputs = {"input": network_input(crop_rgb)} | (_WITH_MASK if with_mask else {})
+        inputs = {"input": image_input(crop_rgb)} | (_WITH_MASK if with_mask else {})
         landmarks, presence, heatmap, world, *logits = session.run(outputs, inputs)
         estimate = interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
         if memory is not None:

@@ -266,7 +266,7 @@ def inside(points: FloatArray, boxes: Sequence[FloatArray]) -> BoolArray:
 MIN_SIDE_PX = 32  # of a part; in a smaller one nobody is found
 
 
-def network_input(crop_rgb: Uint8Array) -> Float32Array:
+def image_input(crop_rgb: Uint8Array) -> Float32Array:
     """Return a picture (H, W, 3) as most networks take it: (1, 3, H, W) in [0, 1]."""
     return cast(Float32Array, cv2.dnn.blobFromImage(crop_rgb, 1 / 255.0))
 
