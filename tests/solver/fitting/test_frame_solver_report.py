@@ -58,7 +58,7 @@ def test_a_clips_shares_count_the_shape_once(focal):
     assert ("focal_prior" in found.cost_by_term) == focal
 
 
-@pytest.mark.filterwarnings("ignore:The body fits the 3D keypoints badly")
+@pytest.mark.filterwarnings("ignore:The body fits the .D keypoints badly")
 def test_rejected_steps_are_counted_among_the_iterations():
     """Keypoints that contradict each other, from a bad start and hardly damped: not every step can
     be right.
