@@ -118,6 +118,8 @@ def _acting(rig: Object) -> Iterator[tuple[PoseBone, Constraint, list[str]]]:
     """Yield the constraints of bones that are not muted, each with the names of the bones that it
     controls: with IK, they may be several.
     """
+    if rig.pose is None:  # as of an armature that a script has just made
+        return
     for bone in rig.pose.bones:
         for constraint in bone.constraints:
             if constraint.is_valid and not constraint.mute and constraint.influence > 0.0:

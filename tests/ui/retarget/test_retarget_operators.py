@@ -111,6 +111,21 @@ def test_the_bone_list_of_the_same_rig_or_a_copy_is_kept(rig):
         assert settings.pairs[0].part == "head"
 
 
+def test_the_bones_of_a_rig_that_a_script_has_just_made_are_listed(rig):
+    """It has no pose before Blender evaluates the scene."""
+    settings = bpy.context.scene.scope_retarget
+    bpy.ops.scope.guess_bones()
+    count = len(settings.pairs)
+    data = rig.data.copy()
+    for bone in data.bones:
+        bone.name = f"copy:{bone.name}"
+    made = bpy.data.objects.new("made", data)
+    assert made.pose is None
+    settings.rig = made
+    assert len(settings.pairs) == count > 20
+    assert all(pair.bone in data.bones for pair in settings.pairs)
+
+
 def test_a_rig_without_bones_empties_the_bone_list(rig):
     settings = bpy.context.scene.scope_retarget
     bpy.ops.scope.guess_bones()
