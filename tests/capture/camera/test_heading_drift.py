@@ -91,7 +91,8 @@ def test_a_runner_alongside_the_camera_stays_on_a_straight_path(shared, observe_
     path = motion.trans[:, :2] - motion.trans[0, :2]
     along = path[-1] / np.linalg.norm(path[-1])
     across = path @ [-along[1], along[0]]
-    assert np.linalg.norm(path[-1]) > 3
+    # Of about three metres, as far as a focal length that is known to 25 percent tells.
+    assert np.linalg.norm(path[-1]) > 2.25
     assert np.abs(np.convolve(across, stride, "valid")).max() < 0.35
 
 
