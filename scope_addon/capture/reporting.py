@@ -42,7 +42,8 @@ UNSURE_LENS = 0.15
 REPEATED_CHANGE = 0.2
 REPEATED_WITHIN_S = 0.15
 REPEATED_SHARE = 0.1  # of the frames in which something moves
-MOVING_CHANGE = 15.0  # of 255; around somebody who stands, compression mostly changes less
+# Of 255. While a person stands still, the changes that compression makes are mostly smaller.
+MOVING_CHANGE = 15.0
 FEWEST_STEPS = 20
 REPEATS_OFF = 0.15  # error of the mean number of frames that show one moment
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen

@@ -253,7 +253,7 @@ def _stance(
     :param times: (T,) seconds.
     """
     offset = (heads[:, legs.hips] - legs.scales * joints[:, legs.sockets]) * _LEVEL
-    if len(times) == 1:  # as of a live capture, where a foot that rests is told by no other frame
+    if len(times) == 1:  # in a live capture, no other frame tells whether a foot rests
         sideways = unit_vectors(turns[..., 0] * _LEVEL)
         across = (offset * sideways).sum(axis=-1, keepdims=True)
         return sideways * np.copysign(np.linalg.norm(offset, axis=-1, keepdims=True), across)
