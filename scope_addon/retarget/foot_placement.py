@@ -198,7 +198,8 @@ def place_feet(
     world = pose.rotations
     heads = pose.heads
     turns = bone_turns[:, legs.ankles]
-    rig_turns = _less_pitched(legs, turns)
+    unpitched = _unpitched(legs, turns)
+    rig_turns = _pitched(turns, -unpitched)
     world[:, legs.ankles] = rig_turns @ transposed(turns) @ world[:, legs.ankles]
     goals = ankle_goal(
         legs.body,
@@ -209,12 +210,14 @@ def place_feet(
         one_floor=one_floor[:, None],
     )
     goals += _stance(legs, heads, turns, joints, times)
-    if legs.toed and one_floor.any():
+    if legs.toed:
+        toes = _with_their_feet(
+            bone_turns[:, legs.toes], turns[:, legs.toed], unpitched[:, legs.toed]
+        )
         balls = (goals + rotated(rig_turns, legs.rig.ball))[one_floor][:, legs.toed]
         rested = (legs.rig.height + legs.rig.ball[:, 2])[legs.toed]
-        flat = flat_toes(bone_turns[one_floor][:, legs.toes], legs.tips, balls, rested)
-        rows = np.flatnonzero(one_floor)
-        world[np.ix_(rows, np.array(legs.toes))] = flat @ legs.toes_in_t_pose
+        toes[one_floor] = flat_toes(toes[one_floor], legs.tips, balls, rested)
+        world[:, legs.toes] = toes @ legs.toes_in_t_pose
     heads[..., 2] -= pelvis_drop(heads[:, legs.hips], goals, legs.lengths, times)[:, None]
     at = _rows(heads[:, legs.hips]), _rows(heads[:, legs.knees]), _rows(heads[:, legs.ankles])
     left = _rows(bone_turns[:, legs.hips, :, 0])  # The axis about which the body's knees bend.
@@ -227,15 +230,40 @@ def place_feet(
     heads[:] = placed + (heads[:, first] - placed[:, first])[:, None]
 
 
-def _less_pitched(legs: Legs, turns: Float64Array) -> Float64Array:
-    """Return E (T, L, 3, 3) of the feet's rotations D; a foot that points steeply down keeps its
-    pitch.
+def _unpitched(legs: Legs, turns: Float64Array) -> Float64Array:
+    """Return by how much less (T, L) the rig's feet are pitched down than the body's, radians; a
+    foot that points steeply down keeps its pitch.
+
+    :param turns: (T, L, 3, 3) D of the feet.
     """
     lengths = np.linalg.norm(legs.rig.ball[:, :2], axis=1)
     wanted = legs.scales[2] * np.linalg.norm(legs.body.ball[:, :2], axis=1)
     excess = 1.0 - np.minimum(wanted / lengths, 1.0)
     pitch = turns[..., 2, 1] * np.clip(_STEEP * turns[..., 2, 2], 0.0, 1.0)
-    return exp(-(excess * pitch)[..., None] * turns[..., 0]) @ turns
+    unpitched: Float64Array = excess * pitch
+    return unpitched
+
+
+def _pitched(turns: Float64Array, angles: Float64Array) -> Float64Array:
+    """Return rotations (..., 3, 3) pitched down by angles (...), radians, about their own axes from
+    side to side.
+    """
+    return exp(angles[..., None] * turns[..., 0]) @ turns
+
+
+def _with_their_feet(
+    toes: Float64Array, feet: Float64Array, unpitched: Float64Array
+) -> Float64Array:
+    """Return toes (T, L, 3, 3) pitched as much less as their feet, but not beyond the pitch of
+    these: toes that are bent, as flat ones under a raised heel, keep their direction.
+
+    :param toes: (T, L, 3, 3) D of the toes.
+    :param feet: (T, L, 3, 3) D of the feet.
+    :param unpitched: (T, L) see `_unpitched`.
+    """
+    steeper = toes[..., 2, 1] - feet[..., 2, 1] + unpitched  # than the rig's feet, nearly radians
+    less = np.clip(steeper, np.minimum(unpitched, 0.0), np.maximum(unpitched, 0.0))
+    return _pitched(toes, -less)
 
 
 def _stance(

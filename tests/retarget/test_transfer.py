@@ -162,3 +162,30 @@ def test_legs_of_other_proportions_point_where_the_bodys_do_and_their_feet_stay_
             ball = heads[begin:end, row]
             assert np.ptp(ball[:, :2], axis=0).max() < 0.01
             np.testing.assert_allclose(ball[:, 2], rig.heads[row, 2] - rig.floor, atol=0.01)
+
+
+def test_toes_of_long_feet_bend_no_further_than_the_bodys() -> None:
+    """Long feet are pitched less than the body's. Stiff toes stay straight in the swing, pitched
+    down as well as up; bendable ones stay flat while the heel rises over them.
+    """
+    rig = proportioned(1.0, 1.0, 1.6)
+    transfer = Transfer(BODY, BETAS, rig, same_names())
+    rows = [MAPPED.index("left_ankle"), MAPPED.index("left_foot")]
+
+    def pitches(*, stiff_toes: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the contact of the left heel and ball, and how far foot and toes point down."""
+        clip, stands = rolling_walk(stiff_toes=stiff_toes)
+        turns = transfer.pose(clip).rotations[:, rows] @ np.swapaxes(rig.rotations[rows], 1, 2)
+        foot, toes = np.degrees(np.arcsin(turns[:, :, 2, 1])).T
+        return stands["left"], foot, toes
+
+    contact, foot, toes = pitches(stiff_toes=True)
+    on_floor = contact.any(axis=1)
+    swings = ~on_floor
+    swings[1:] &= ~on_floor[:-1]  # Until then, the floor bends the toes.
+    assert foot[swings].max() > 20.0
+    assert foot[swings].min() < -10.0
+    np.testing.assert_allclose(toes[swings], foot[swings], atol=1.0)
+    contact, foot, toes = pitches(stiff_toes=False)
+    assert foot[contact[:, 1]].max() > 20.0
+    np.testing.assert_allclose(toes[contact[:, 1]], 0.0, atol=1.0)
