@@ -83,12 +83,14 @@ def name_that_is_not_utf8() -> None:
 
 
 def damaged_code() -> None:
-    """Damage some of the compiled code that comes with the extension: a capture compiles it
-    again.
+    """Damage some of the compiled code that comes with the extension or, where none comes with it,
+    that captures have compiled: a capture compiles it again.
     """
-    files = Path("home/.config/blender").glob(
-        "*/extensions/user_default/scope/assets/kernels/*/*.code"
-    )
+    extensions = Path("home/.config/blender")
+    files = [*extensions.glob("*/extensions/user_default/scope/assets/kernels/*/*.code")]
+    files = files or [
+        *extensions.glob("*/extensions/.user/user_default/scope/cache/kernels/*/*.code")
+    ]
     empty, cut, flipped = sorted(files, key=lambda path: path.stat().st_size)[:3]
     whole = {path: path.read_bytes() for path in (empty, cut, flipped)}
     replace(empty, b"")
