@@ -33,7 +33,7 @@ from .world.world_frame import GIVEN, LINES, UP_DEVIATIONS_DEG
 
 CLOSED = 0.5  # weight of a blink above which an eye is closed
 GIVEN_FLOOR_M = 0.03  # of the floor above or below z = 0 in the world of a given path
-# Relative deviation of the focal length above which the path of a camera that travels is unsure:
+# Relative deviation of the focal length from which on the path of a camera that travels is unsure:
 # of an estimate from few edges of the background, or none.
 UNSURE_LENS = 0.15
 # Frames that repeat the one before change by less than this share of the largest changes that are
@@ -170,7 +170,7 @@ def camera_warnings(name: str, footage: Footage, solved: Solved) -> list[Notice]
         warnings.append(notice("unknown_travel", footage=name))
     elif solved.travel_source == FEET:
         warnings.append(notice("travel_by_feet", footage=name))
-    elif solved.travel_source is not None and footage.camera.focal_deviation > UNSURE_LENS:
+    elif solved.travel_source is not None and footage.camera.focal_deviation >= UNSURE_LENS:
         warnings.append(notice("travel_by_lens", footage=name))
     if footage.world_from_camera is not None:
         lowered_m = (
@@ -214,6 +214,9 @@ def repetition_warnings(name: str, fps: float, changes: Float64Array) -> list[No
     around = np.minimum(largest[:count], largest[reach + 1 :])
     # Where nothing moves, a repeated frame looks like any other.
     repeats = (changes < REPEATED_CHANGE * around) & (around > MOVING_CHANGE)
+    for first, end in runs(repeats):  # What slows down and speeds up again repeats nothing.
+        beside = min(changes[first - 1], changes[end])
+        repeats[first:end] = changes[first:end].max() < REPEATED_CHANGE * beside
     if not repeats.any():
         return []
     least = max(MOVING_CHANGE, np.median(changes[repeats]) / REPEATED_CHANGE)

@@ -235,20 +235,30 @@ def test_a_preset_that_ones_own_network_ignores_is_said(tmp_path):
     assert unused(tmp_path / "a.png", quality="fast") == []
 
 
+COARSE = np.random.default_rng(1).integers(0, 256, (9, 16, 3), dtype=np.uint8)
+ROOM = cv2.resize(COARSE, (320, 180)).astype(float)
+
+
 def changes_of(shown, noise=1.0):
     """The changes of pictures that show these moments of a man who walks through a room, after a
     compression that changes what stands still by the noise, of 255.
     """
-    rng = np.random.default_rng(1)
-    room = cv2.resize(rng.integers(0, 256, (9, 16, 3), dtype=np.uint8), (320, 180)).astype(float)
-    cuts = SceneCuts(RATE)
+    pictures = []
     for k, moment in enumerate(shown):
-        picture = room + noise * np.random.default_rng(k).normal(size=room.shape)
+        picture = ROOM + noise * np.random.default_rng(k).normal(size=ROOM.shape)
         x = 40 + round(1.5 * moment)
         swing = round(12 * np.sin(0.2 * moment))
         picture[60:120, x : x + 20] = [200, 40, 40]
         picture[120:160, x + swing : x + swing + 10] = [30, 30, 90]
-        cuts.is_cut(np.clip(picture, 0, 255).astype(np.uint8), None)
+        pictures.append(picture)
+    return changes_between(pictures)
+
+
+def changes_between(pictures):
+    shown = [np.clip(picture, 0, 255).astype(np.uint8) for picture in pictures]
+    cuts = SceneCuts(RATE)
+    for picture, upcoming in zip(shown, [*shown[1:], None], strict=True):
+        cuts.is_cut(picture, upcoming)
     return np.array(cuts.changes)
 
 
@@ -275,6 +285,25 @@ def test_frames_that_repeat_the_one_before_are_said(fps, shown_fps):
 @pytest.mark.parametrize("shown", [np.arange(120), np.zeros(120), np.r_[:60, [59] * 15, 60:105]])
 def test_somebody_who_moves_stands_or_pauses_repeats_no_frames(shown):
     assert repetition_warnings("a.mp4", 30.0, changes_of(shown)) == []
+
+
+@pytest.mark.parametrize(("fps", "hz"), [(30.0, 1.5), (30.0, 2.5), (60.0, 5.0)])
+@pytest.mark.parametrize("form", [np.sin, lambda turn: np.arcsin(np.sin(turn))])
+@pytest.mark.parametrize("reach", [10.0, 30.0])
+def test_a_hand_that_waves_before_a_room_repeats_no_frames(fps, hz, form, reach):
+    """Though it stands still for a moment at the end of each stroke, or turns back between two
+    frames.
+    """
+    columns = np.arange(320)
+    noise = np.random.default_rng(2).normal(size=(7, *ROOM.shape))
+    pictures = ROOM + noise[np.arange(120) % len(noise)]
+    for k, picture in enumerate(pictures):
+        left = 160 + reach * form(2 * np.pi * hz * (k + 0.5) / fps)
+        # Its edges are six pixels wide.
+        covers = np.clip(np.minimum(columns - left, left + 20 - columns) / 6 + 0.5, 0, 1)
+        hand = picture[80:110]
+        hand += covers[:, None] * ([200, 150, 120] - hand)
+    assert repetition_warnings("a.mp4", fps, changes_between(pictures)) == []
 
 
 def test_what_compression_does_to_somebody_who_stands_repeats_no_frames():

@@ -30,6 +30,9 @@ MIN_RATIO = 4.0  # to the usual difference
 PERSISTENCE = 0.7  # share of the difference that is left a frame later
 HISTORY_FRAMES = 15  # from which the usual difference is taken
 MIN_CONTRAST = 8.0  # standard deviation within a picture; a blank one has less
+# The frames before and after two that are the same differ by less than this share of their changes
+# from these if the picture turns back.
+TURNING_BACK = 0.5
 # Across a gap: standard deviations, mean over the picture and colours. Of eleven clips, frames half
 # a second apart differ by at most 0.44, 0.46 in all but one if half as bright again, and frames of
 # two clips by at least 0.77.
@@ -47,12 +50,14 @@ class SceneCuts:
     """Detects cuts in frames that come in order, so many per second.
 
     ``changes``: of each frame so far, the largest change of a place in it from the frame before, of
-    255; 0 for the first.
+    255; 0 for the first. Where the picture turns back, as with a hand that waves, two frames may be
+    the same though everything moves: there, it is the change of the frames beside them.
     """
 
     def __init__(self, fps: float) -> None:
         self.changes: list[float] = []
         self._last: Float32Array | None = None
+        self._second_last: Float32Array | None = None
         self._before: Float32Array | None = None
         self._upcoming: Float32Array | None = None
         self._is_after_gap = False  # blank frames follow `_before`
@@ -69,7 +74,8 @@ class SceneCuts:
         now = _thumbnail(image_rgb) if self._upcoming is None else self._upcoming
         self._upcoming = None if upcoming_rgb is None else _thumbnail(upcoming_rgb)
         last = now if self._last is None else self._last
-        self.changes.append(float(np.abs(now - last).max()))
+        self.changes.append(self._change(last, now))
+        self._second_last = self._last
         self._last = now
         before = self._before
         self._before = now
@@ -104,6 +110,17 @@ class SceneCuts:
             self._recent.clear()
         return is_cut
 
+    def _change(self, last: Float32Array, now: Float32Array) -> float:
+        """Return the largest change, see ``changes``."""
+        if self._second_last is not None and self._upcoming is not None:
+            beside = min(
+                _largest_difference(self._second_last, last),
+                _largest_difference(now, self._upcoming),
+            )
+            if _largest_difference(self._second_last, self._upcoming) < TURNING_BACK * beside:
+                return beside
+        return _largest_difference(last, now)
+
 
 def _thumbnail(image_rgb: Uint8Array) -> Float32Array:
     height, width = image_rgb.shape[:2]
@@ -136,6 +153,10 @@ def _is_blended(thumbnails: Sequence[Float32Array]) -> bool:
     shares = np.linalg.lstsq(scenes.T, patterns.T, rcond=None)[0]
     left = ((patterns - shares.T @ scenes) ** 2).sum(axis=1) / (patterns**2).sum(axis=1)
     return bool(left.max() <= MAX_NOT_BLENDED)
+
+
+def _largest_difference(a: Float32Array, b: Float32Array) -> float:
+    return float(np.abs(a - b).max())
 
 
 def _difference(a: Float32Array, b: Float32Array) -> float:
