@@ -62,9 +62,12 @@ def guess(rest: RestPose, *, is_mirrored: bool = False, held: Collection[str] = 
     """
     rigify = _rigify(rest.names)
     if rigify is None and (spare := _spare(rest, held)):
+        whole = guess(rest, is_mirrored=is_mirrored)
         free = guess(_without(rest, spare), is_mirrored=is_mirrored)
-        if not _is_impossible(rest, free.parts):
-            return _with_limbs(free, guess(rest, is_mirrored=is_mirrored))
+        while needed := _irreplaceable(rest, spare, whole.parts, free.parts):
+            spare -= needed
+            free = guess(_without(rest, spare), is_mirrored=is_mirrored)
+        return whole if _is_impossible(rest, free.parts) else _with_limbs(free, whole)
     shaped = by_geometry(rest)
     named = rigify or by_name(rest)
     if _is_impossible(rest, named) and not _is_impossible(rest, shaped):
@@ -197,6 +200,27 @@ def _with_limbs(free: BoneMap, whole: BoneMap) -> BoneMap:
     parts |= {bone: part for bone, part in whole.parts.items() if _limb_of(part) in lacking}
     known = whole.confidence | free.confidence
     return BoneMap(parts, {bone: known[bone] for bone in parts})
+
+
+def _irreplaceable(
+    rest: RestPose, spare: Collection[str], whole: Mapping[str, str], free: Mapping[str, str]
+) -> set[str]:
+    """Return the spare bones of limbs and spines that do not do without: none of the bones that
+    they have otherwise begins where a spare one does.
+
+    :param whole: the parts of bones, guessed from all of them.
+    :param free: those guessed without the spare ones.
+    """
+    limbs = set()
+    for bone in whole.keys() & spare:
+        limb = _limb_of(whole[bone])
+        if limb.endswith((" leg", " arm")) and not whole[bone].endswith(_JOINTS):
+            continue
+        others = [rest.names.index(each) for each, part in free.items() if _limb_of(part) == limb]
+        away = np.linalg.norm(rest.heads[others] - rest.heads[rest.names.index(bone)], axis=1)
+        if not (away < _NEAR * rest.size).any():
+            limbs.add(limb)
+    return {bone for bone in whole.keys() & spare if _limb_of(whole[bone]) in limbs}
 
 
 def _limb_of(part: str) -> str:

@@ -201,3 +201,20 @@ def test_bones_that_constraints_turn_are_taken_where_there_are_no_others(
     bones, part_of = bones_of(scheme)
     held = {bone for bone, part in part_of.items() if part.endswith(limb)}
     assert guess(bones, held=held).parts == part_of
+
+
+@pytest.mark.parametrize("parts", [("spine1",), ("spine2", "spine3"), ("neck",), ("hip",)])
+@pytest.mark.parametrize("scheme", ["nameless", "unreal"])
+def test_bones_that_constraints_turn_are_taken_where_those_beside_them_are_of_no_use(
+    scheme: str, parts: tuple[str, ...]
+) -> None:
+    """Their targets, say, which hang from the pelvis."""
+    bones, part_of = bones_of(scheme, drop=0.8)
+    held = [bone for bone, part in part_of.items() if part.endswith(parts)]
+    pelvis = bones.names.index(names_of(scheme)["pelvis"])
+    rest = RestPose(
+        [*bones.names, *(f"target{k}" for k in range(len(held)))],
+        np.array([*bones.parents, *[pelvis] * len(held)]),
+        np.array([*bones.heads, *(bones.heads[bones.names.index(bone)] for bone in held)]),
+    )
+    assert guess(rest, held=held).parts == part_of
