@@ -44,6 +44,8 @@ _NEAR = 0.005
 # Lengths of mirror images differ by no more than this share.
 _ALIKE = 0.03
 _SLIGHT = 0.01  # The weight of a bone without a mirror image.
+# Wings are behind arms by more than this share of the rig's size.
+_BEHIND = 0.02
 # What is no lower than this share of the highest bone in the middle belongs to the head.
 _HIGH = 0.9
 # The tip of a head is above it by more than this multiple of the neck's bones.
@@ -447,6 +449,8 @@ def by_geometry(rest: RestPose) -> dict[str, str]:
     person = _person(rest, ends)
     for limb, bones in ends.items():
         ends[limb] = [bone for bone in bones if person in rest.chains[bone]] or bones
+    for side in OTHER_SIDE:
+        ends[f"{side} arm"] = _before_wings(rest, ends, side)
     chains: dict[str, list[int]] = {}
     for side, outwards in (("left", leftwards), ("right", -leftwards)):
         chains[f"{side} leg"] = min((rest.chains[b] for b in ends[f"{side} leg"]), key=len)
@@ -554,6 +558,32 @@ def _person(rest: RestPose, ends: Mapping[str, list[int]]) -> int:
         found or range(len(rest.names)),
         key=lambda bone: (len(carried[bone]), is_fk[bone], len(rest.chains[bone])),
     )
+
+
+def _before_wings(rest: RestPose, ends: Mapping[str, list[int]], side: str) -> list[int]:
+    """Return the ends of the arm on a side without those of wings: of several limbs, of three bones
+    and more, that one bone carries, arms are where the toes point.
+
+    :param ends: the bones at which each limb may end.
+    """
+    toes = [*ends["left leg"], *ends["right leg"]]
+    forward = (rest.heads[toes] - rest.heads[rest.parents[toes]]).sum(axis=0) * [1.0, 1.0, 0.0]
+    forward /= max(float(np.linalg.norm(forward)), 1e-9)
+    across = {above for hand in ends[f"{OTHER_SIDE[side]} arm"] for above in rest.chains[hand]}
+    limbs: dict[int, list[int]] = {}
+    for hand in ends[f"{side} arm"]:
+        own = [bone for bone in rest.chains[hand] if bone not in across]
+        if len(own) > 2:
+            limbs.setdefault(own[0], own)
+    ahead = {first: float((rest.heads[own] @ forward).mean()) for first, own in limbs.items()}
+    wings = {
+        first
+        for first in ahead
+        for other in ahead
+        if rest.parents[first] == rest.parents[other]
+        and ahead[other] - ahead[first] > _BEHIND * rest.size
+    }
+    return [hand for hand in ends[f"{side} arm"] if not wings.intersection(rest.chains[hand])]
 
 
 def _is_leg(chain: list[int], upwards: Float64Array, outwards: Float64Array) -> bool:

@@ -120,6 +120,25 @@ def test_a_tail_does_not_tell_the_sides() -> None:
     assert guess(rest).parts == part_of
 
 
+@pytest.mark.parametrize("drop", [0.0, 0.8])
+@pytest.mark.parametrize("turn", [0.0, 2.0])
+@pytest.mark.parametrize(("rise", "reach"), [(0.3, 0.9), (-0.6, 0.4)])
+def test_wings_are_no_arms(drop: float, turn: float, rise: float, reach: float) -> None:
+    """Spread or folded, on the back of a person that is turned."""
+    bones, part_of = bones_of("nameless", drop=drop)
+    chest = bones.names.index(names_of("nameless")["spine3"])
+    names = [*bones.names]
+    parents = [*bones.parents]
+    heads = [*bones.heads]
+    for side in (1.0, -1.0):
+        for k, share in enumerate(np.linspace(0.1, 1.0, 5)):
+            parents.append(len(names) - 1 if k else chest)
+            names.append(f"wing{len(names)}")
+            heads.append(np.array([side * reach * share, 0.1 + 0.2 * share, 1.4 + rise * share]))
+    turned = np.array(heads) @ exp(np.array([0.0, 0.0, turn])).T
+    assert guess(RestPose(names, np.array(parents), turned)).parts == part_of
+
+
 def test_a_coat_down_to_the_feet_is_no_legs() -> None:
     """It hangs from the neck: with it for legs, the chest would carry a whole person."""
     bones, part_of = bones_of("nameless", drop=0.8)
