@@ -14,7 +14,7 @@ import numpy as np
 
 from ...solver import Body
 from ..arrays import Float64Array, FloatArray, Uint8Array
-from ..capture.camera.bars import find_bars, longer_content_side
+from ..capture.camera.bars import content_size, find_bars
 from ..capture.camera.intrinsics import Camera
 from ..capture.camera.line_segments import Segments, find_segments
 from ..capture.camera.verticals import estimate_up_from_lines
@@ -137,8 +137,8 @@ class Calibrator:
         bars = find_bars(image_rgb)
         self._segments = find_segments(image_rgb, people, bars=bars)
         if self._given.focal_deviation > 0.0:
-            longer_px = longer_content_side(bars, *self._size)
-            self._camera = camera_by_edges(self._segments, *self._size, longer_px)
+            content = content_size(bars, *self._size)
+            self._camera = camera_by_edges(self._segments, *self._size, content)
 
     def estimate(
         self, times_s: Sequence[float], observations: Sequence[Observation]

@@ -134,7 +134,7 @@ def run_live(
     )
     for warning in execution.warnings:  # fewer cores than threads, or a provider that fell back
         listeners.say(str(warning))
-    LiveBody(body, assumed_camera(*CAMERA_SIZE, CAMERA_SIZE[0])).load()
+    LiveBody(body, assumed_camera(*CAMERA_SIZE, CAMERA_SIZE)).load()
     statistics = Statistics()
     reader = NewestFrame(source, clock, options.reconnect_s, listeners.say, listeners.received)
     stopped = False

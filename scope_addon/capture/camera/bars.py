@@ -60,15 +60,16 @@ def find_bars(image_rgb: Uint8Array) -> list[Float64Array]:
     return bars
 
 
-def longer_content_side(bars: Sequence[Float64Array], width: int, height: int) -> float:
-    """Return the longer side, in pixels, of the content between the bars.
+def content_size(bars: Sequence[Float64Array], width: int, height: int) -> tuple[float, float]:
+    """Return width and height, in pixels, of the content between the bars.
 
     :param bars: (4,) each, as `find_bars` returns them.
     :param width, height: of the whole picture in pixels.
     """
     sizes = np.array([bar[2:] - bar[:2] for bar in bars]).reshape(-1, 2)
     is_upright = sizes[:, 1] == height
-    return float(max(width - sizes[is_upright, 0].sum(), height - sizes[~is_upright, 1].sum()))
+    content_width = float(width - sizes[is_upright, 0].sum())
+    return content_width, float(height - sizes[~is_upright, 1].sum())
 
 
 def _black_bars(bright: FloatArray) -> tuple[int, int] | None:

@@ -17,17 +17,26 @@ from ...footage_view import AS_IN_FILE, FootageView
 from .calibration import Calibration, read_calibration
 from .given_path import read_camera_path
 
-# The default is a field of view of 60 degrees along the longer side, between a phone's main camera
-# (65-70 degrees, less the crop of its video stabilization) and a camera's standard lens (40-54
-# degrees). Edges of the background give a better estimate, and the body adds little
-# (focal_length.py), because it depends on the lifted points, and these on the assumed focal length.
-# In 19 clips of known focal length (four calibrated cameras of 59.4 to 60.1 degrees, fifteen
-# renders) the root mean square error of its logarithm is 0.33 by default, and 0.30 with both
-# estimates: for the renders 0.33 instead of 0.37, for the cameras 0.06 instead of 0.01. Assuming 50
-# or 70 degrees for the cameras moved the person by 0.6 to 0.8 m in camera axes, but changed the
-# error relative to the pelvis by 7 mm at most.
-DEFAULT_FOV_DEG = 60.0
-ASSUMED_DEVIATION = 0.25  # relative error of the default, one standard deviation: 48 to 74 degrees
+# Edges of the background give a better estimate (focal_length.py) than what is assumed without any.
+# Assuming 50 or 70 degrees for four cameras of 60 moved the person by 0.6 to 0.8 m in camera axes,
+# but changed the error relative to the pelvis by 7 mm at most.
+
+
+@dataclass(frozen=True)
+class AssumedLens:
+    """A field of view along the longer side, and the relative error of its focal length, one
+    standard deviation.
+    """
+
+    fov_deg: float
+    deviation: float
+
+
+# Between a phone's main camera and a camera's standard lens (40 to 54 degrees): 48 to 74 degrees.
+ANY_LENS = AssumedLens(60.0, 0.25)
+# Who films upright holds a phone. The main cameras of phones see 58 to 70 degrees in videos, with
+# and without the crop of their stabilization: 57 to 73 degrees.
+PHONE_LENS = AssumedLens(65.0, 0.15)
 FOCAL_STEP_PX = 2.0**-6  # to which estimates are rounded
 FILM_WIDTH_MM = 36.0  # "35 mm equivalent" focal lengths refer to this width along the longer side
 
@@ -63,9 +72,9 @@ class Camera:
         """Return the camera with ``zoom`` times the focal length."""
         return replace(self, intrinsics=self.intrinsics @ np.diag([zoom, zoom, 1.0]))
 
-    def between_bars(self, longer_px: float, width: int, height: int) -> Camera:
-        """Return the camera whose picture has this longer side, between bars of a frame."""
-        share = longer_px / max(width, height)
+    def between_bars(self, content: tuple[float, float], width: int, height: int) -> Camera:
+        """Return the camera whose picture has this width and height, between bars of a frame."""
+        share = max(content) / max(width, height)
         if not self.is_by_side or share >= 1.0:
             return self
         return replace(self.zoomed(share), source=f"{self.source} between the bars")
@@ -162,7 +171,7 @@ def choose_camera(
         focal_px = metadata_focal_mm / FILM_WIDTH_MM * longer
         source = f"the file's metadata, {metadata_focal_mm:g} mm"
     else:
-        return assumed_camera(width, height, longer)
+        return assumed_camera(width, height, (width, height))
     return Camera(pinhole(width, height, focal_px), np.zeros(5), source, is_by_side=True)
 
 
@@ -180,30 +189,33 @@ def _lens_of_file(
     return None
 
 
-def assumed_camera(width: int, height: int, longer_px: float) -> Camera:
-    """Return the camera with the default field of view.
+def assumed_camera(width: int, height: int, content: tuple[float, float]) -> Camera:
+    """Return the camera with the lens that is assumed where nothing is known of it.
 
     :param width, height: of the footage in pixels.
-    :param longer_px: the longer side of the camera's image, which is smaller than the footage's
+    :param content: width and height of the camera's image, which is smaller than the footage
         between bars.
     """
-    source = f"assumed, {DEFAULT_FOV_DEG:g} degrees"
+    content_width, content_height = content
+    lens = PHONE_LENS if content_height > content_width else ANY_LENS
+    source = f"assumed, {lens.fov_deg:g} degrees"
+    longer_px = max(content)
     if longer_px < max(width, height):
         source += " between the bars"
-    focal_px = _focal_from_fov(longer_px, DEFAULT_FOV_DEG)
-    return Camera(pinhole(width, height, focal_px), np.zeros(5), source, ASSUMED_DEVIATION)
+    focal_px = _focal_from_fov(longer_px, lens.fov_deg)
+    return Camera(pinhole(width, height, focal_px), np.zeros(5), source, lens.deviation)
 
 
 def estimated_camera(
-    width: int, height: int, focal_px: float, deviation: float, longer_px: float
+    width: int, height: int, focal_px: float, deviation: float, content: tuple[float, float]
 ) -> Camera:
     """Return the camera with an estimated focal length.
 
     :param width, height: of the footage in pixels.
     :param deviation: its relative error, one standard deviation.
-    :param longer_px: as for `assumed_camera`.
+    :param content: as for `assumed_camera`.
     """
-    fov_deg = 2 * math.degrees(math.atan(longer_px / (2 * focal_px)))
+    fov_deg = 2 * math.degrees(math.atan(max(content) / (2 * focal_px)))
     source = f"estimated, {fov_deg:.0f} degrees ± {100 * deviation:.0f} %"
     intrinsics = pinhole(width, height, round_number(focal_px, FOCAL_STEP_PX))
     return Camera(intrinsics, np.zeros(5), source, deviation)

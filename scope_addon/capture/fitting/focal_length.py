@@ -32,9 +32,9 @@ import numpy as np
 from ...arrays import Float64Array
 from ...machine_code.code_cache import compiled_kernels
 from ..camera.background_record import BackgroundRecord
-from ..camera.bars import longer_content_side
+from ..camera.bars import content_size
 from ..camera.camera_rotation import BackgroundTracker
-from ..camera.intrinsics import ASSUMED_DEVIATION, Camera, assumed_camera, estimated_camera
+from ..camera.intrinsics import Camera, assumed_camera, estimated_camera
 from ..camera.line_segments import Segments
 from ..camera.manhattan import Edges
 from ..camera.zoom import Zoom
@@ -45,40 +45,51 @@ KAPPA = 4.0
 LOG_RANGE = 0.7
 COARSE_STEP = 0.05
 FINE_STEP = 0.0125
-MAX_DEVIATION = 0.2  # of log f; a less certain estimate is no better than the assumption
+# Of log f, against the assumption's; a less certain estimate is no better than the assumption.
+MAX_DEVIATION = 0.8
 
 
-def camera_by_edges(segments: Segments, width: int, height: int, longer_px: float) -> Camera:
+def camera_by_edges(
+    segments: Segments, width: int, height: int, content: tuple[float, float]
+) -> Camera:
     """Return the camera with the focal length estimated from edges or, if that fails, the assumed
     one.
 
-    :param longer_px: longer side of the image without letterbox bars, see `bars`.
+    :param content: width and height of the image without letterbox bars, see `bars`.
     """
-    camera = assumed_camera(width, height, longer_px)
-    found = focal_from_edges(segments, width, height, camera.intrinsics[0, 0])
-    return estimated_camera(width, height, *found, longer_px) if found else camera
+    camera = assumed_camera(width, height, content)
+    found = focal_from_edges(segments, width, height, camera)
+    return estimated_camera(width, height, *found, content) if found else camera
 
 
 def focal_from_edges(
-    segments: Segments, width: int, height: int, assumed_px: float
+    segments: Segments, width: int, height: int, assumed: Camera
 ) -> tuple[float, float] | None:
     """Estimate the focal length in pixels and its relative error from an image's edges; None if it
     is uncertain.
+
+    :param assumed: the camera as it is without edges.
     """
+    assumed_px = assumed.intrinsics[0, 0]
+    assumed_deviation = assumed.focal_deviation
     edges = Edges.of(segments, width, height)
     coarse = np.arange(-LOG_RANGE, LOG_RANGE + 1e-9, COARSE_STEP)
     scores = [edges.support(assumed_px * np.exp(x)) for x in coarse]
-    best = float(coarse[_log_posterior(coarse, scores).argmax()])
+    best = float(coarse[_log_posterior(coarse, scores, assumed_deviation).argmax()])
     fine = np.arange(best - COARSE_STEP, best + COARSE_STEP + 1e-9, FINE_STEP)
     log_ratio = np.concatenate([coarse[np.abs(coarse - best) > COARSE_STEP + 1e-6], fine])
     known = dict(zip(coarse.tolist(), scores, strict=True))
     scores = [known.get(x) or edges.support(assumed_px * np.exp(x)) for x in log_ratio.tolist()]
-    mean, deviation = _moments(log_ratio, _log_posterior(log_ratio, scores))
-    return (assumed_px * float(np.exp(mean)), deviation) if deviation < MAX_DEVIATION else None
+    mean, deviation = _moments(log_ratio, _log_posterior(log_ratio, scores, assumed_deviation))
+    if deviation >= MAX_DEVIATION * assumed_deviation:
+        return None
+    return assumed_px * float(np.exp(mean)), deviation
 
 
-def _log_posterior(log_ratio: Float64Array, scores: list[float]) -> Float64Array:
-    return KAPPA * np.array(scores) - 0.5 * np.square(log_ratio / ASSUMED_DEVIATION)
+def _log_posterior(
+    log_ratio: Float64Array, scores: list[float], assumed_deviation: float
+) -> Float64Array:
+    return KAPPA * np.array(scores) - 0.5 * np.square(log_ratio / assumed_deviation)
 
 
 def _moments(log_ratio: Float64Array, log_p: Float64Array) -> tuple[float, float]:
@@ -132,8 +143,8 @@ class BackgroundEstimators:
         if is_known or self._by_edges is not None or not followed.edge_frames:
             return
         segments = followed.edge_frames[0].segments
-        longer_px = longer_content_side(followed.bars, *self._size)
-        self._by_edges = self.pool.submit(camera_by_edges, segments, *self._size, longer_px)
+        content = content_size(followed.bars, *self._size)
+        self._by_edges = self.pool.submit(camera_by_edges, segments, *self._size, content)
 
     def camera(self, record: BackgroundRecord, zoom: Zoom | None = None) -> Camera:
         """Return the camera of the first frame, from the background of all frames; an assumed focal
@@ -143,8 +154,8 @@ class BackgroundEstimators:
         """
         self.use_edges(record)
         if self._by_edges is None:
-            longer_px = longer_content_side(record.bars, *self._size)
-            return self._given_camera.between_bars(longer_px, *self._size)
+            content = content_size(record.bars, *self._size)
+            return self._given_camera.between_bars(content, *self._size)
         camera = self._by_edges.result()
         if zoom is None:
             return camera

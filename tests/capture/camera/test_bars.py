@@ -8,7 +8,7 @@ from fractions import Fraction
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.camera.bars import find_bars, longer_content_side
+from scope.scope_addon.capture.camera.bars import content_size, find_bars
 from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.camera.line_segments import find_segments
@@ -42,8 +42,8 @@ def test_bars_are_found(sides: tuple[int, int, int, int]) -> None:
     expected = np.zeros((HEIGHT, WIDTH), bool)
     expected[top : HEIGHT - bottom, left : WIDTH - right] = True
     assert (inside == expected).mean() > 0.995
-    longer = max(WIDTH - left - right, HEIGHT - top - bottom)
-    assert longer_content_side(bars, WIDTH, HEIGHT) == pytest.approx(longer, abs=4)
+    size = (WIDTH - left - right, HEIGHT - top - bottom)
+    assert content_size(bars, WIDTH, HEIGHT) == pytest.approx(size, abs=4)
 
 
 @pytest.mark.parametrize(("kind", "upright"), [("blurred", False), ("white", True)])
@@ -63,7 +63,8 @@ def test_bars_of_other_kinds_are_found(kind: str, upright: bool) -> None:
     bars = find_bars(np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), np.uint8))
     sizes = [bar[[3, 2]] if upright else bar[[2, 3]] for bar in bars]
     assert sizes[0][0] == pytest.approx(330, abs=2)
-    assert longer_content_side(bars, *picture.shape[1::-1]) == pytest.approx(540)
+    content = (540, 300) if upright else (300, 540)
+    assert content_size(bars, *picture.shape[1::-1]) == pytest.approx(content, abs=4)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +80,7 @@ def test_bars_of_other_kinds_are_found(kind: str, upright: bool) -> None:
 )
 def test_other_pictures_have_no_bars(picture: np.ndarray) -> None:
     assert find_bars(picture) == []
-    assert longer_content_side([], WIDTH, HEIGHT) == WIDTH
+    assert content_size([], WIDTH, HEIGHT) == (WIDTH, HEIGHT)
 
 
 def test_edges_of_bars_are_neither_lines_nor_corners() -> None:

@@ -4,7 +4,12 @@
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker
-from scope.scope_addon.capture.camera.intrinsics import Camera, choose_camera, pinhole
+from scope.scope_addon.capture.camera.intrinsics import (
+    Camera,
+    assumed_camera,
+    choose_camera,
+    pinhole,
+)
 from scope.scope_addon.errors import UsageError
 
 
@@ -21,6 +26,28 @@ def test_metadata_counts_only_without_the_users_value():
         choose_camera(3600, 2000, metadata_focal_mm=26, focal_mm=50).intrinsics[0, 0], 5000
     )
     assert "assumed" in choose_camera(640, 480).source
+
+
+@pytest.mark.parametrize(
+    ("size", "content", "degrees"),
+    [
+        ((1280, 720), (1280, 720), 60),
+        ((720, 720), (720, 720), 60),
+        ((720, 1280), (720, 1280), 65),
+        ((1920, 1080), (608, 1080), 65),  # an upright clip in a wide frame
+        ((1080, 1920), (1080, 608), 60),  # a film on an upright screen
+    ],
+)
+def test_upright_pictures_are_taken_for_a_phones(size, content, degrees):
+    """Phones that were calibrated for motion capture, 720 x 1280, have 856 to 925 pixels."""
+    camera = assumed_camera(*size, content)
+    focal_px = max(content) / 2 / np.tan(np.radians(degrees / 2))
+    assert camera.intrinsics[0, 0] == pytest.approx(focal_px)
+    assert camera.source.startswith(f"assumed, {degrees} degrees")
+    if degrees == 65:
+        calibrated = np.array([856.0, 913.0, 925.0]) / 1280
+        error = np.log(calibrated * max(content) / focal_px) / camera.focal_deviation
+        assert np.abs(error).max() < 1.5
 
 
 @pytest.mark.parametrize(
@@ -51,11 +78,11 @@ def test_a_distorting_lens_and_a_background_without_features():
 def test_a_given_focal_length_is_that_of_the_picture_between_bars(tmp_path):
     """A portrait clip of 608 x 1080 in a wide video, filmed with a phone's 26 mm."""
     camera = choose_camera(1920, 1080, focal_mm=26.0)
-    between = camera.between_bars(1080.0, 1920, 1080)
+    between = camera.between_bars((608.0, 1080.0), 1920, 1080)
     assert between.intrinsics[0, 0] == pytest.approx(26.0 / 36.0 * 1080.0)
     assert between.source == "given, 26 mm between the bars"
-    assert camera.between_bars(1920.0, 1920, 1080) is camera
+    assert camera.between_bars((1920.0, 1080.0), 1920, 1080) is camera
     file = tmp_path / "calibration.json"
     file.write_text('{"intrinsics": [[1400, 0, 960], [0, 1400, 540], [0, 0, 1]]}')
     calibrated = choose_camera(1920, 1080, calibration=file)
-    assert calibrated.between_bars(1080.0, 1920, 1080) is calibrated
+    assert calibrated.between_bars((608.0, 1080.0), 1920, 1080) is calibrated

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The focal length from edges: drawn boxes seen by a known camera, and real images with known
 calibration.
-
-The focal length from fits: the body itself in front of known cameras, and our own clip with
-exact ground truth.
 """
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -16,27 +14,22 @@ import pytest
 from scope.scope_addon.capture.camera.intrinsics import choose_camera, pinhole
 from scope.scope_addon.capture.camera.line_segments import Segments, find_segments
 from scope.scope_addon.capture.camera.manhattan import Edges
-from scope.scope_addon.capture.fitting.focal_length import (
-    focal_from_edges,
-)
+from scope.scope_addon.capture.fitting.focal_length import camera_by_edges, focal_from_edges
 from scope.solver.rotations import exp
 
 from ..exact_tracks import pixels_of
 
 WIDTH = 1280
-
-
 HEIGHT = 720
+ASSUMED_CAMERA = choose_camera(WIDTH, HEIGHT)
+ASSUMED = ASSUMED_CAMERA.intrinsics[0, 0]
 
 
-ASSUMED = choose_camera(WIDTH, HEIGHT).intrinsics[0, 0]
-
-
-def room(focal_px, R_camera_room, clutter=20, seed=0):
+def room(focal_px, R_camera_room, clutter=20, seed=0, size=(WIDTH, HEIGHT)):
     """An image of edges along three orthogonal directions, with clutter in any direction."""
     rng = np.random.default_rng(seed)
-    K = pinhole(WIDTH, HEIGHT, focal_px)
-    picture = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
+    K = pinhole(*size, focal_px)
+    picture = np.full((size[1], size[0], 3), 120, np.uint8)
 
     def line(a, b, colour):
         ends = np.array([a, b]) @ R_camera_room.T + [0, 0, 7.0]
@@ -57,7 +50,7 @@ def room(focal_px, R_camera_room, clutter=20, seed=0):
 
 
 def found(picture):
-    return focal_from_edges(find_segments(picture, []), WIDTH, HEIGHT, ASSUMED)
+    return focal_from_edges(find_segments(picture, []), WIDTH, HEIGHT, ASSUMED_CAMERA)
 
 
 @pytest.mark.parametrize(
@@ -98,7 +91,7 @@ def test_horizontal_edges_count_at_every_focal_length_without_vertical_ones(rati
 
 
 def test_no_edges_give_no_estimate():
-    assert focal_from_edges(Segments.none(), WIDTH, HEIGHT, ASSUMED) is None
+    assert focal_from_edges(Segments.none(), WIDTH, HEIGHT, ASSUMED_CAMERA) is None
     assert found(np.full((HEIGHT, WIDTH, 3), 90, np.uint8)) is None
 
 
@@ -113,6 +106,18 @@ def test_random_edges_give_no_estimate(seed):
     assert found(scribble) is None
 
 
+def test_edges_of_a_phones_upright_picture_are_weighed_against_a_phones_lens():
+    """Its edges tell the focal length; without any, that of phones is kept."""
+    size = (HEIGHT, WIDTH)
+    R = exp([0.1, 0, 0]) @ exp([0, 0.6, 0])
+    focal_px = 0.9 * ASSUMED
+    picture = room(focal_px, R, size=size)
+    camera = camera_by_edges(find_segments(picture, []), *size, size)
+    assert camera.intrinsics[0, 0] == pytest.approx(focal_px, rel=0.05)
+    assert camera.source.startswith("estimated")
+    assert camera_by_edges(Segments.none(), *size, size).source == "assumed, 65 degrees"
+
+
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
 def test_real_cameras(shared, number):
     """Four images of a laboratory; one of them has too few edges in depth and must not give an
@@ -125,7 +130,8 @@ def test_real_cameras(shared, number):
     truth = json.loads((folder / f"calibration_cam{number}.json").read_text("utf-8"))["intrinsics"][
         0
     ][0]
-    assumed = 1.2 * truth  # so that what was assumed is no help
+    # so that what was assumed is no help
+    assumed = replace(choose_camera(width, height), intrinsics=pinhole(width, height, 1.2 * truth))
     estimate = focal_from_edges(
         find_segments(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), []), width, height, assumed
     )

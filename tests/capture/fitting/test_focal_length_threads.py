@@ -37,7 +37,7 @@ def test_a_cancel_while_compiling_is_passed_on(monkeypatch):
 
     with (
         pytest.raises(KeyboardInterrupt),
-        BackgroundEstimators(assumed_camera(64, 48, 64.0), 64, 48, live) as background,
+        BackgroundEstimators(assumed_camera(64, 48, (64.0, 48.0)), 64, 48, live) as background,
     ):
         background.wait_for_solver(cancel)
 
@@ -62,7 +62,9 @@ class Background:
 def estimate(frames, given=None):
     """The camera, if its background is looked at in the first frames, and at the end."""
     followed, live = Background(), SimpleNamespace(load=lambda: None)
-    with BackgroundEstimators(given or assumed_camera(64, 48, 64.0), 64, 48, live) as background:
+    with BackgroundEstimators(
+        given or assumed_camera(64, 48, (64.0, 48.0)), 64, 48, live
+    ) as background:
         for row in range(10):
             followed.add(row)
             if row < frames:
@@ -83,7 +85,7 @@ def test_a_given_focal_length_is_not_estimated(monkeypatch):
     monkeypatch.setattr(focal_length, "camera_by_edges", None)
     given = choose_camera(64, 48, fov_deg=40.0)
     camera = estimate(10, given)
-    expected = given.between_bars(48.0, 64, 48)
+    expected = given.between_bars((48.0, 48.0), 64, 48)
     assert (camera.source, camera.focal_deviation) == (expected.source, 0.0)
     np.testing.assert_array_equal(camera.intrinsics, expected.intrinsics)
 
@@ -102,5 +104,7 @@ def test_the_focal_length_is_that_of_the_first_edges_whenever_these_are_looked_a
     monkeypatch.setattr(focal_length, "camera_by_edges", recorded)
     camera = estimate(frames)
     assert len(seen) == 1
-    assert seen[0][1] == (64, 48, 48.0)  # of the picture between the bars
-    np.testing.assert_array_equal(camera.intrinsics, assumed_camera(64, 48, 48.0).intrinsics)
+    assert seen[0][1] == (64, 48, (48.0, 48.0))  # of the picture between the bars
+    np.testing.assert_array_equal(
+        camera.intrinsics, assumed_camera(64, 48, (48.0, 48.0)).intrinsics
+    )
