@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import os
 import platform
+import shlex
 import sys
 import tomllib
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -65,10 +66,24 @@ def check_installed(modules: Sequence[str]) -> None:
     """
     missing = [name for name in modules if name not in sys.modules and find_spec(name) is None]
     if missing:
-        extras = ",".join(dict.fromkeys(EXTRAS[name] for name in missing))
         raise SetupError(
-            f"{', '.join(missing)} must be installed for this: pip install 'scope-mocap[{extras}]'"
+            f"{', '.join(missing)} must be installed for this: "
+            f"{_installation({EXTRAS[name] for name in missing})}"
         )
+
+
+def _installation(extras: set[str]) -> str:
+    """Return how the packages of extras are installed. Scope itself is in no package index."""
+    try:
+        stated = [text.partition(";") for text in requires("scope-mocap") or ()]
+    except PackageNotFoundError:
+        return "install Scope again"
+    needed = [
+        name.strip()
+        for name, _, condition in stated
+        if any(f'extra == "{extra}"' in condition for extra in extras)
+    ]
+    return f"pip install {shlex.join(needed)}"
 
 
 def machine() -> str:

@@ -69,6 +69,11 @@ LEFT_OUT = (
     *("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "examples", "cluster"),
     *SENDERS,
 )
+NETWORK_NAMES = (
+    *("pose_detection", "pose_landmark_lite", "pose_landmark_full", "pose_landmark_heavy"),
+    *("palm_detection", "hand_landmark", "face_landmark", "face_expression"),
+)
+NETWORK_LICENCE = "LICENSE-mediapipe.txt"
 BILL = "bill_of_materials.cdx.json"  # in the zip; a copy with the zip's name lies beside it
 LIMIT_MB = 200
 
@@ -403,11 +408,9 @@ def check(archive: Path, target: Target) -> None:
             problems.append(f"{count} wheels of {package}")
     if any(w.lower().startswith("numpy") for w in listed):
         problems.append("numpy is shipped")
-    networks = ("pose_detection", "pose_landmark_lite", "pose_landmark_full", "pose_landmark_heavy")
-    networks += ("palm_detection", "hand_landmark", "face_landmark", "face_expression")
-    wanted = [f"assets/networks/{n}.onnx" for n in networks]
+    wanted = [f"assets/networks/{name}.onnx" for name in NETWORK_NAMES]
     wanted += [
-        "assets/networks/LICENSE-mediapipe.txt",
+        f"assets/networks/{NETWORK_LICENCE}",
         "assets/body/scope.npz",
         "assets/body/scope_h.npz",
     ]

@@ -21,11 +21,12 @@ from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
-from build_extension import DIST
+from build_extension import DIST, NETWORK_LICENCE, NETWORK_NAMES
 from source_time import source_time
 
 ROOT = Path(__file__).resolve().parent.parent
 RELEASE = ROOT / "build" / "release"
+NETWORKS = ROOT / "assets" / "networks"
 HASHES = "SHA256SUMS"
 NOTES = "notes.md"
 LISTING = "listing.md"
@@ -167,15 +168,23 @@ def listing_of_zips(listing: dict[str, Any], zips_at: str) -> dict[str, Any]:
 
 
 def build_wheel(folder: Path) -> None:
-    """Build the wheel from a copy of the tracked sources: setuptools leaves files beside them."""
+    """Build the wheel from a copy of the tracked sources, since setuptools leaves files beside
+    them, and of the networks.
+
+    :raises SystemExit: this is no Git checkout, or networks are missing, or pip fails.
+    """
     if not (ROOT / ".git").exists():
         raise SystemExit(f"release: {ROOT} is no Git checkout, and the wheel is of tracked files")
+    networks = [NETWORKS / f"{name}.onnx" for name in NETWORK_NAMES] + [NETWORKS / NETWORK_LICENCE]
+    if missing := [path.name for path in networks if not path.is_file()]:
+        raise SystemExit(f"release: {NETWORKS} lacks {', '.join(missing)}; run ./scripts/setup")
     environment = os.environ | {"SOURCE_DATE_EPOCH": str(int(source_time().timestamp()))}
     listed = subprocess.run(
         ["git", "-C", str(ROOT), "ls-files", "-z"], capture_output=True, text=True, check=True
     )
     with tempfile.TemporaryDirectory(prefix="scope-wheel-") as name:
-        for path in listed.stdout.split("\0"):
+        built = [path.relative_to(ROOT).as_posix() for path in networks]
+        for path in [*listed.stdout.split("\0"), *built]:
             if path.startswith(("tests/", "docs/", "benchmarks/")) or not (ROOT / path).is_file():
                 continue
             target = Path(name) / path

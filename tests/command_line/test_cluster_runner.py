@@ -16,7 +16,7 @@ def batch(tmp_path, scheduler):
     [
         (
             "distributed",
-            "distributed must be installed for this: pip install 'scope-mocap[cluster]'",
+            "distributed must be installed for this: pip install 'distributed>=",
         ),
         (
             ".cluster",

@@ -5,6 +5,7 @@ numba.
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 from scope.scope_addon.machine_code.code_folders import places
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -30,8 +32,22 @@ DATA = {
     "scope/assets/face/controls/mpfb.json",
     "scope/assets/face/controls/rigify.json",
     "scope/assets/face/controls/rigify_skin.json",
+    "scope/assets/face/response.npz",
+    "scope/assets/lifter/LICENSE.md",
+    "scope/assets/lifter/README.md",
+    "scope/assets/lifter/lifter.onnx",
+    "scope/assets/networks/face_expression.onnx",
+    "scope/assets/networks/face_landmark.onnx",
+    "scope/assets/networks/hand_landmark.onnx",
+    "scope/assets/networks/palm_detection.onnx",
+    "scope/assets/networks/pose_detection.onnx",
+    "scope/assets/networks/pose_landmark_full.onnx",
+    "scope/assets/networks/pose_landmark_heavy.onnx",
+    "scope/assets/networks/pose_landmark_lite.onnx",
     "scope/assets/prior/README.md",
     "scope/assets/prior/joint_prior.npz",
+    "scope/assets/sample/LICENSE.md",
+    "scope/assets/sample/sample.mp4",
     "scope/scope_addon/report/static/motion.js",
     "scope/scope_addon/report/static/page.js",
     "scope/scope_addon/report/static/style.css",
@@ -70,11 +86,11 @@ def folders() -> set[str]:
 
 
 @pytest.fixture(scope="session")
-def wheel(tmp_path_factory) -> Path:
+def wheel(tmp_path_factory, networks) -> Path:
     """The wheel, built from a copy of the sources, so that nothing is written into the checkout."""
     place = tmp_path_factory.mktemp("wheel")
     source = place / "source"
-    ignored = shutil.ignore_patterns("__pycache__", "*.onnx", "pictures", "guide", "sample")
+    ignored = shutil.ignore_patterns("__pycache__", "pictures", "guide")
     for name in (*PRODUCT, "assets", "tests", "tools", "benchmarks", "scripts"):
         shutil.copytree(ROOT / name, source / name, ignore=ignored)
     for name in (
@@ -180,6 +196,46 @@ def test_the_wheel_requires_only_numpy_and_numba(wheel):
     assert names == ["numpy", "numba", "llvmlite"]  # the last of which numba needs anyway
 
 
+@pytest.mark.slow
+def test_the_wheel_states_the_licences_of_all_that_it_contains(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        contents = {
+            name.partition(".dist-info/")[2]: archive.read(name) for name in archive.namelist()
+        }
+    lines = contents["METADATA"].decode().splitlines()
+    assert "License-Expression: GPL-3.0-or-later AND Apache-2.0 AND CC0-1.0" in lines
+    licences = {name.removeprefix("licenses/") for name in contents if name.startswith("licenses/")}
+    assert licences == {
+        "LICENSE",
+        "THIRD_PARTY.md",
+        "assets/body/LICENSE.md",
+        "assets/lifter/LICENSE.md",
+        "assets/networks/LICENSE-mediapipe.txt",
+        "assets/sample/LICENSE.md",
+        "solver/LICENSE",
+    }
+
+
+@pytest.mark.parametrize("python", ["3.11", "3.13"])
+def test_a_capture_installs_versions_that_were_tested_and_none_that_fail(python):
+    """OpenCV 4.14 and 5 lack `setLogLevel`, onnxruntime from 1.29 on reports to its makers."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    lock = (ROOT / "scripts" / "requirements" / f"{python}.txt").read_text("utf-8")
+    tested = dict(re.findall(r"^(\S+?)==(\S+)", lock, flags=re.M))
+    fails = {
+        "onnxruntime": ("1.27.0", "1.29.0", "1.32.0"),
+        "opencv-contrib-python-headless": ("4.10.0.84", "4.14.0.94", "5.0.0.93"),
+        "av": ("17.0.0", "19.0.0"),
+        "numba": ("0.69.0",),
+        "llvmlite": ("0.51.0",),
+        "numpy": (),
+    }
+    for text in (*project["dependencies"], *project["optional-dependencies"]["capture"]):
+        needed = Requirement(text)
+        assert needed.specifier.contains(tested[needed.name]), text
+        assert not [v for v in fails[needed.name] if needed.specifier.contains(v)], text
+
+
 def test_the_extras_contain_every_package_of_a_missing_module():
     from scope.scope_addon.installed import EXTRAS
 
@@ -208,7 +264,10 @@ def test_the_solver_fits_with_only_numpy_and_numba(installed):
 def test_the_command_line_reports_missing_packages(installed, command):
     done = run(installed, "-m", "scope.scope_addon", *command)
     assert done.returncode == 1
-    assert done.stderr == (
-        "scope: cv2, onnxruntime, av must be installed for this: pip install "
-        "'scope-mocap[capture]'\n"
-    )
+    says = "scope: cv2, onnxruntime, av must be installed for this: pip install "
+    assert done.stderr.startswith(says)
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"][
+        "optional-dependencies"
+    ]
+    named = [Requirement(text) for text in shlex.split(done.stderr.removeprefix(says))]
+    assert named == [Requirement(text) for text in extras["capture"]]

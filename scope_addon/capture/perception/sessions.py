@@ -161,7 +161,7 @@ def network_path(name: str) -> Path:
         raise SetupError(
             f"{path} is missing. Build the networks in the repository with: python -m "
             "scope.tools.convert_networks "
-            "(a wheel contains none: capture with the scripts of the repository)"
+            "(a release's wheel contains them, one made of the sources alone does not)"
         )
     return path
 

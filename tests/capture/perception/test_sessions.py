@@ -2,7 +2,7 @@
 """Opening a network leaves nothing behind: onnxruntime's wheels keep a list of events for a server
 of Microsoft's.
 
-And networks that are missing: a wheel of Scope has none, nor the tool that builds them.
+And networks that are missing: a wheel made of the sources alone has none.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def test_missing_and_damaged_networks_are_named(
     monkeypatch.setattr(sessions, "NETWORKS_FOLDER", tmp_path)
     with pytest.raises(
         SetupError,
-        match="lite.onnx is missing.*a wheel contains none: capture with the scripts of the repo",
+        match="lite.onnx is missing.*a release's wheel contains them",
     ):
         sessions.network_path("pose_landmark_lite")
     broken = tmp_path / "broken.onnx"
