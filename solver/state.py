@@ -153,16 +153,16 @@ class Fit:
     and rows of further tables; seen: of them, the points, directions and rows of pose priors.
     """
 
-    state: State
+    state: State = field(repr=False)
     status: Status
     cost: float
     iterations: int
-    R_camera_part: Array
-    t_camera_part: Array
-    beta_information: Array
+    R_camera_part: Array = field(repr=False)
+    t_camera_part: Array = field(repr=False)
+    beta_information: Array = field(repr=False)
     measurements: int
     seen: int = 0
-    rejected: int = 0
+    rejected: int = field(default=0, repr=False)
     cost_by_term: dict[str, float] = field(default_factory=dict)
 
 
@@ -176,12 +176,12 @@ class ClipFit:
     `Fit`, of the fit of all frames that found the shape.
     """
 
-    frames: list[Fit]
+    frames: list[Fit] = field(repr=False)
     beta: Array
-    beta_information: Array
+    beta_information: Array = field(repr=False)
     focal_scale: float
     status: Status
     cost: float
     iterations: int
-    rejected: int = 0
+    rejected: int = field(default=0, repr=False)
     cost_by_term: dict[str, float] = field(default_factory=dict)

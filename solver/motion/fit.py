@@ -65,19 +65,19 @@ class MotionFit:
     the shape; NaN where the cost is not finite.
     """
 
-    states: list[State]
-    R_world_part: Array
-    t_world_part: Array
+    states: list[State] = field(repr=False)
+    R_world_part: Array = field(repr=False)
+    t_world_part: Array = field(repr=False)
     beta: Array
-    beta_information: Array
+    beta_information: Array = field(repr=False)
     focal_scale: float
-    measurements: Array
+    measurements: Array = field(repr=False)
     status: Status
     cost: float
     iterations: int
-    rejected: int
-    joint_covariance: Array | None = None
-    covariance_from_root: Array | None = None
+    rejected: int = field(repr=False)
+    joint_covariance: Array | None = field(default=None, repr=False)
+    covariance_from_root: Array | None = field(default=None, repr=False)
     cost_by_term: dict[str, float] = field(default_factory=dict)
 
 

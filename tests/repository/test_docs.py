@@ -360,7 +360,7 @@ def test_the_captures_of_the_readme_are_run(words, folder):
 @pytest.mark.parametrize(
     "code", [each for each in blocks("python") if not str(each.id).startswith("solver_api")]
 )
-def test_every_python_block_runs(code, body, folder):
+def test_every_python_block_runs(code, body, folder, capsys):
     seen = {"joints_cam": np.ones((3, body.K + 1, 3))}
     made_motion(body, np.zeros((3, 3 * (body.K + 1))), np.zeros((3, 3)), **seen).save(
         folder / "walk.npz"
@@ -387,6 +387,11 @@ def test_every_python_block_runs(code, body, folder):
         assert error.mean() < 0.2  # one view does not fix the depth
     joints = names.get("joints")
     assert joints is None or np.isfinite(joints).all()
+    if "off" in names:
+        status, error = capsys.readouterr().out.split(", ")
+        page = (ROOT / "docs" / "for_researchers.md").read_text("utf-8")
+        said = re.search(rf"prints `{status}, (\d+) mm`", page)
+        assert float(said[1]) == pytest.approx(float(error.split()[0]), abs=3.0)
 
 
 @pytest.mark.parametrize("code", blocks("toml"))

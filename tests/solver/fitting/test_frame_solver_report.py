@@ -14,9 +14,11 @@ from scope.solver import (
     Weights,
     fit,
     fit_clip,
+    fit_motion,
 )
 from scope.solver.residuals.registry import NAMES
 
+from .. import small_problem
 from ..residuals.test_foot_contact import BODY, FEET, points, seen, standing
 from .test_frame_solver import measured, scene
 
@@ -70,3 +72,16 @@ def test_rejected_steps_are_counted_among_the_iterations():
     assert found.status in (Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS)
     short = fit(body, m, options=Options(stages=[Stage(max_iterations=2, tolerance=0.0)]))
     assert (short.status, short.iterations) == (Status.MAX_ITERATIONS, 2)
+
+
+def test_a_printed_result_is_one_short_line():
+    """Of a single frame, a clip and a motion alike: how it ended, without its many arrays."""
+    body, seen = small_problem.BODY, [small_problem.SEEN] * 2
+    found = fit(body, seen[0]), fit_clip(body, seen), fit_motion(body, seen, [0.0, 0.1])
+    for result in found:
+        printed = str(result)
+        assert "\n" not in printed
+        assert len(printed) < 300
+        assert "CONVERGED" in printed
+        assert f"cost={result.cost}" in printed
+        assert "rejected" not in printed  # which reads as rejected measurements
