@@ -191,6 +191,8 @@ def build(target: Target, folder: Path, website: str = "", *, kernels: bool = Tr
     made = source_time()
     bill = bill_of_materials(STAGING, wheels, target.platform, made)
     (STAGING / BILL).write_text(bill, "utf-8")
+    stated = STAGING / "blender_manifest.toml"
+    stated.write_text(with_licences(stated.read_text("utf-8"), bill), "utf-8")
     archive.with_suffix(".cdx.json").write_text(bill, "utf-8")
     blender_extension("validate", str(STAGING))
     write_zip(STAGING, archive, made)
@@ -366,6 +368,19 @@ def manifest(target: Target, wheels: list[str], website: str = "") -> str:
         top += f"\n{key} = [\n" + "".join(f'    "{value}",\n' for value in values) + "]\n"
     tables = tables.split("\n[build]")[0]  # the staging folder holds only what is shipped
     return f"{top}\n[{tables}\n"
+
+
+def with_licences(manifest: str, bill: str) -> str:
+    """Return a manifest that also states the licences of a bill of materials, of a choice the
+    first.
+    """
+    stated = tomllib.loads(manifest)["license"]
+    expressions = re.findall(r'"expression": "([^"]+)"', bill)
+    parts = {part for text in expressions for part in text.split(" AND ")}
+    others = {f"SPDX:{part.split(' OR ')[0]}" for part in parts} - set(stated)
+    listed = "".join(f"    {json.dumps(licence)},\n" for licence in [*stated, *sorted(others)])
+    before, _, rest = manifest.partition("\nlicense = [\n")
+    return f"{before}\nlicense = [\n{listed}{rest[rest.index(']') :]}"
 
 
 def blender_extension(*arguments: str) -> str:

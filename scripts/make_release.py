@@ -146,11 +146,13 @@ def collect(notes: str, zips_at: str) -> None:
             os.link(path, folder / path.name)
         listing = listing_of_zips(json.loads((DIST / "index.json").read_text("utf-8")), zips_at)
         (folder / "index.json").write_text(json.dumps(listing, indent=2) + "\n", "utf-8")
+        licences = dict.fromkeys(text for entry in listing["data"] for text in entry["license"])
+        stated = manifest() | {"license": list(licences)}
         build_wheel(folder)
         run([sys.executable, str(ROOT / "scripts" / "solver_wheel.py"), str(folder)])
         (folder / NOTES).write_text(notes, "utf-8")
         readme = (ROOT / "README.md").read_text("utf-8")
-        (folder / LISTING).write_text(listing_text(manifest(), readme, notes), "utf-8")
+        (folder / LISTING).write_text(listing_text(stated, readme, notes), "utf-8")
         for picture in PICTURES:
             write_picture(ROOT / "assets" / "guide" / f"{picture}.jpg", folder / f"{picture}.png")
         write_hashes(folder)

@@ -28,6 +28,12 @@ from source_time import source_time
 ROOT = Path(__file__).resolve().parent.parent
 CODE = ROOT / "build" / "solver_code"
 NAME = "scope_solver"
+# Files of the wheel's licences, and where they are found here: of the code, the prior, the bodies.
+LICENCES = {
+    "LICENSE": "solver/LICENSE",
+    "assets/prior/LICENSE": "LICENSE",
+    "assets/body/LICENSE.md": "assets/body/LICENSE.md",
+}
 LICENCE = "Apache-2.0 AND GPL-3.0-or-later AND CC0-1.0"  # of code, joint prior and bodies
 ASSETS = (
     "assets/body/LICENSE.md",
@@ -210,7 +216,7 @@ def build_wheel(folder: Path, code: Path, digest: str) -> Path:
         f"Version: {version}",
         "Summary: Sparse Gauss-Newton fitting of human pose and shape, with numpy and numba",
         f"License-Expression: {LICENCE}",
-        "License-File: LICENSE",
+        *(f"License-File: {name}" for name in LICENCES),
         f"Requires-Python: {project['requires-python']}",
         *(f"Requires-Dist: {needed}" for needed in project["dependencies"]),
         *(f"Provides-Extra: {extra}" for extra in EXTRAS),
@@ -221,7 +227,7 @@ def build_wheel(folder: Path, code: Path, digest: str) -> Path:
     files = {f"scope/{path.relative_to(ROOT).as_posix()}": path for path in sources()}
     files |= {f"scope/{asset}": ROOT / asset for asset in ASSETS}
     files["scope/__init__.py"] = ROOT / "__init__.py"
-    files[f"{information}/licenses/LICENSE"] = ROOT / "solver" / "LICENSE"
+    files |= {f"{information}/licenses/{name}": ROOT / path for name, path in LICENCES.items()}
     for path in sorted(code.glob("*/*.nb[ic]")):
         files[f"scope/solver/machine_code/{path.parent.name}/{path.name}"] = path
     contents = {name: path.read_bytes() for name, path in files.items()}

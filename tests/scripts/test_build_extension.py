@@ -7,6 +7,7 @@ import ast
 import hashlib
 import importlib.util
 import inspect
+import json
 import os
 import re
 import shutil
@@ -188,6 +189,20 @@ def test_the_manifest_names_licences_and_holders_of_all_that_the_zip_contains(bu
         assert package == "av" or package in " ".join(manifest["copyright"])
     validate = getattr(blenders_tool(), "pkg_manifest_validate_field_copyright", None)
     assert validate is None or validate(manifest["copyright"], True) is None
+
+
+def test_a_zips_manifest_names_every_licence_of_its_bill_and_keeps_the_rest(builder):
+    """Of libraries under one of several licences, it names the first."""
+    text = builder.manifest(builder.Target("linux-x64", "3.13"), ["./wheels/av.whl"])
+    named = ("MIT", "OpenSSL", "LGPL-3.0-or-later OR GPL-2.0-or-later", "IJG AND Zlib")
+    named += ("GPL-3.0-or-later WITH GCC-exception-3.1", "LicenseRef-Intel")
+    parts = [{"name": name, "licenses": [{"expression": name}]} for name in named]
+    bill = json.dumps({"components": [{"components": parts[:3]}, *parts[3:]]}, indent=2)
+    before = tomllib.loads(text)
+    after = tomllib.loads(builder.with_licences(text, bill))
+    added = ("GPL-3.0-or-later WITH GCC-exception-3.1", "IJG", "LGPL-3.0-or-later")
+    added += ("LicenseRef-Intel", "OpenSSL", "Zlib")
+    assert after == before | {"license": before["license"] + [f"SPDX:{name}" for name in added]}
 
 
 @pytest.mark.slow

@@ -88,6 +88,15 @@ def test_it_states_its_licences_and_needs_numpy_and_numba_alone(wheel):
         "Provides-Extra: jax",
         "Provides-Extra: torch",
     ]
+    with zipfile.ZipFile(wheel) as archive:
+        for name, heading in {
+            "LICENSE": "Apache License",
+            "assets/prior/LICENSE": "GNU GENERAL PUBLIC LICENSE",
+            "assets/body/LICENSE.md": "# Licence of the default body",
+        }.items():
+            assert f"License-File: {name}" in lines
+            licence = archive.read(metadata.replace("METADATA", f"licenses/{name}")).decode()
+            assert licence.lstrip().startswith(heading)
     assert "joint prior (`assets/prior/joint_prior.npz`) is under GPL-3.0-or-later" in text
     assert "](../" not in text
 
