@@ -39,8 +39,8 @@ _MAX_SEGMENT_RATIO = 4.0
 _MAX_SIDE_RATIO = 1.5
 # Of the line from the hips to the head, from the vertical.
 _MAX_LEAN = np.radians(50)
-# Hips that are less than this share of their legs' length above the ankles sit or squat: the motion
-# would be lowered by as much. Digitigrade legs stand at nine tenths.
+# Hips that are less than this share of their legs' length above the ankles sit or squat: their feet
+# may be off the floor. Digitigrade legs stand at nine tenths.
 _MIN_STANDING = 0.65
 
 

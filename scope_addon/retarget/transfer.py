@@ -80,11 +80,11 @@ class Transfer:
         self._scales = np.array([legs if travel is None else travel] * 2 + [legs])
         self._hips = [row["left_hip"], row["right_hip"]]
         self._source_hips = [index["left_hip"], index["right_hip"]]
-        # Both stand on their floors at rest: heights are measured from there.
+        # Both stand on their floors in the body's T-pose: heights are measured from there.
         self._lift = np.zeros(3)
         vertices = body.rest_vertices(betas) @ R_WORLD_MODEL.T
         rested = rest[self._source_hips, 2].mean() - vertices[:, 2].min()
-        self._lift[2] = (rig.heads[self._hips, 2].mean() - rig.floor) - legs * rested
+        self._lift[2] = self._height_of_hips(row) - legs * rested
         self._legs = (
             legs_at_rest(rig, row, alignment, body, (vertices, rest), self._scales)
             if feet
@@ -111,6 +111,18 @@ class Transfer:
             held = np.broadcast_to(one_floor, len(clip))
             place_feet(rig, self._legs, turns, pose, joints, clip.times, held)
         return pose
+
+    def _height_of_hips(self, row: dict[str, int]) -> float:
+        """Return how high the rig's hips are above its floor, metres, where its legs have the
+        directions of the body's at rest; its own may be bent at rest.
+
+        :param row: the rig's bone of each body part.
+        """
+        part = "ankle" if "left_ankle" in row and "right_ankle" in row else "knee"
+        ends = [row[f"left_{part}"], row[f"right_{part}"]]
+        heads = head_positions(self._rig, self._rested[None])[0, :, 2]
+        standing = heads[self._hips] - heads[ends] + self._rig.heads[ends, 2]
+        return float(standing.mean()) - self._rig.floor
 
     def _turns(self, D: Float64Array) -> Float64Array:
         """Return D of each bone (T, B, 3, 3) from D of each joint; spine and neck are distributed

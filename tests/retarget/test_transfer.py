@@ -117,6 +117,27 @@ def test_limbs_of_a_rig_in_an_a_pose_point_where_the_bodys_do(feet: bool) -> Non
         )
 
 
+@pytest.mark.parametrize(("bend", "feet"), [(0.2, True), (0.9, True), (0.9, False)])
+def test_legs_that_are_bent_at_rest_straighten_as_the_bodys_do(bend: float, feet: bool) -> None:
+    """A rig that was built with bent knees stands as the same rig with straight ones does."""
+    straight = body_rig(scale=1.3)
+    heads = straight.heads.copy()
+    for side in ("left", "right"):
+        rows = [MAPPED.index(f"{side}_{part}") for part in ("hip", "knee", "ankle", "foot")]
+        hip, knee, ankle, ball = straight.heads[rows]
+        forward = exp(np.array([-bend, 0.0, 0.0]))
+        heads[rows[1]] = hip + forward @ (knee - hip)
+        heads[rows[2]] = heads[rows[1]] + forward.T @ (ankle - knee)
+        heads[rows[3]] = heads[rows[2]] + ball - ankle
+    moved = heads - straight.heads
+    floor = straight.floor + moved[MAPPED.index("left_ankle"), 2]
+    bent = replace(straight, heads=heads, ends=straight.ends + moved, floor=floor)
+    poses = [
+        Transfer(BODY, BETAS, rig, same_names(), feet=feet).pose(CLIP) for rig in (straight, bent)
+    ]
+    np.testing.assert_allclose(poses[1].heads, poses[0].heads, atol=1e-3)
+
+
 def proportioned(hips: float, legs: float, feet: float) -> Skeleton:
     """Return the body's own skeleton with multiples of the distance of its hips, of the length of
     its legs and of that of its feet.

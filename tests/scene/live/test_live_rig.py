@@ -43,8 +43,8 @@ def test_the_pose_is_that_of_the_retargeted_frame(options):
         )
     retarget(captured(motion), BODY, np.zeros(BODY.P), rig, bone_map, RATE, options)
     # The pelvis is lowered smoothly in time for stretched legs, and without the later frames a
-    # little differently.
-    np.testing.assert_allclose(followed, seen(rig, bones.values()), atol=0.002)
+    # little differently, which moves the knees most.
+    np.testing.assert_allclose(followed, seen(rig, bones.values()), atol=0.004)
 
 
 def test_the_pose_and_the_parent_from_before_are_kept():
