@@ -68,6 +68,7 @@ from .errors import (
     UsageError,
     exit_status,
     internal_error_message,
+    keep_solver_hints_from_users,
     lacks_memory,
     system_error_message,
 )
@@ -482,6 +483,7 @@ def run() -> NoReturn:
     written and closed at this point, so the process exits without running destructors.
     """
     open_standard_streams()
+    keep_solver_hints_from_users()
     status = main(own_process=True)
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):  # a full disk, or a reader who went away

@@ -21,9 +21,10 @@ Each message says what was wrong, with which file or value, and what to do about
 from __future__ import annotations
 
 import errno
+import warnings
 from pathlib import Path
 
-from ..solver.errors import InputError, ScopeError
+from ..solver.errors import InputError, ScopeError, ScopeWarning
 
 # exit statuses
 FAILED = 1
@@ -75,6 +76,16 @@ class ClusterError(ScopeError):
 
 class CancelledError(ScopeError):
     """The user cancelled; nothing was written."""
+
+
+def keep_solver_hints_from_users() -> None:
+    """Let this process print no ``ScopeWarning``: these are for programs that call the solver.
+
+    What the application measures may look as mistaken as what they name: people who leap off a roof
+    are under the floor. Each process of the application calls this; one that only imports its
+    packages keeps the hints. Filters of ``python -W`` and of tests come first.
+    """
+    warnings.filterwarnings("ignore", category=ScopeWarning, append=True)
 
 
 def exit_status(error: ScopeError) -> int:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lack of memory is recognized, in whatever words a library says it.
 
-Numbers with their noun.
+Numbers with their noun. Hints of the solver to programmers.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.command_line.live_command import _summary
 from scope.scope_addon.errors import lacks_memory, system_error_message
+from scope.scope_addon.job.request import WARM_UP
 from scope.scope_addon.notices import counted
 
 from .fuzz.system_calls import AVAILABLE, NO_MEMORY, traced
@@ -28,6 +29,46 @@ try:
 except BaseException as error:
     print(lacks_memory(error), error)
 """
+
+# A person far under the floor, as one who leaps off a roof, of whom the solver says so.
+HINT = """
+import numpy as np
+from scope.solver import Floor, Keypoints3D, Measurements
+def hint(*_, **__):
+    points = Keypoints3D(range(5), np.full((5, 3), [0.0, 3.0, 5.0]), np.ones(5))
+    floor = Floor([0], np.array([0.0, -1.0, 0.0]), -1.0, np.ones(1))
+    Measurements(keypoints3d=points, floor=floor).packed_tables(22, 100)
+    return 0
+"""
+PROGRAMS = {
+    "a program that calls the solver": "hint()",
+    "the same, which loads a body with the application": """
+import scope.scope_addon.untrusted.body_file
+hint()""",
+}
+PROCESSES = {
+    "the command line": """
+from scope.scope_addon import cli
+cli.main = hint
+cli.run()""",
+    "a worker of Blender": """
+import sys
+from pathlib import Path
+from scope.scope_addon.job import worker
+worker.run = worker.end_with_parent = hint
+worker.main(Path(sys.argv[1]))""",
+}
+
+
+@pytest.mark.parametrize("name", PROGRAMS | PROCESSES)
+def test_hints_to_programmers_reach_these_alone(name, tmp_path) -> None:
+    """Users of a capture cannot negate the normal of a floor."""
+    command = [sys.executable, "-c", HINT + (PROGRAMS | PROCESSES)[name], str(tmp_path)]
+    done = subprocess.run(command, input=WARM_UP, capture_output=True, text=True, check=True)
+    if name in PROGRAMS:
+        assert "ScopeWarning: Most 3D keypoints lie" in done.stderr
+    else:
+        assert not done.stderr
 
 
 def test_a_defect_is_not_lack_of_memory() -> None:

@@ -15,7 +15,12 @@ from typing import IO, NoReturn
 
 from ...solver.errors import ScopeError
 from ..confinement import confine_capture, folders_of
-from ..errors import exit_status, lacks_memory, system_error_message
+from ..errors import (
+    exit_status,
+    keep_solver_hints_from_users,
+    lacks_memory,
+    system_error_message,
+)
 from ..footage import json_text
 from ..parent import end_with_parent
 from ..temporary import discard, remove
@@ -143,6 +148,7 @@ def main(job_folder: Path) -> NoReturn:
     """Run the worker process: the request on stdin, messages on stdout, everything else on
     stderr.
     """
+    keep_solver_hints_from_users()
     # Everything that libraries print to stdout, including from C, goes to stderr; the messages get
     # the real stdout.
     stream = os.fdopen(os.dup(1), "w", encoding="utf-8")

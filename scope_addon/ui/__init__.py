@@ -15,6 +15,7 @@ from contextlib import ExitStack
 import bpy
 from bpy.app.handlers import persistent
 
+from ..errors import keep_solver_hints_from_users
 from . import (
     action_operators,
     capture_operators,
@@ -80,6 +81,7 @@ _MODULES = (
 
 def register() -> None:
     """Register everything with Blender; if that fails, nothing stays registered."""
+    keep_solver_hints_from_users()
     with ExitStack() as undo:
         for module in _MODULES:
             for cls in module.CLASSES:

@@ -80,6 +80,17 @@ def test_enabling_loads_no_heavy_library_and_collects_no_garbage():
     assert done.stdout.strip().splitlines()[-1] == "[] 0"
 
 
+def test_what_the_solver_tells_programmers_is_not_printed_in_blender():
+    code = (
+        "import os, warnings, bpy, scope; from scope.solver.errors import UnitsWarning; "
+        "scope.register(); warnings.warn('lengths in millimetres', UnitsWarning); "
+        "warnings.warn('of another add-on'); os._exit(0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "UserWarning: of another add-on" in done.stderr
+    assert "millimetres" not in done.stderr
+
+
 def test_a_failing_registration_leaves_nothing(unregistered, monkeypatch):
     from scope.scope_addon.ui import translations
 
