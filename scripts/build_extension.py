@@ -162,12 +162,15 @@ def main() -> int:
         made = [compile_kernels(target) for target in targets]
         return 0 if all(made) else 1
     folder = OTHER_DIST if args.any_blender else DIST
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    kept = set()
     for target in targets:
         archive = build(target, folder, args.website, kernels=not args.no_kernels)
+        kept |= {archive, archive.with_suffix(".cdx.json")}
         size = archive.stat().st_size / 1e6
         print(f"{archive}  {size:.0f} MB", flush=True)
+    for old in {*folder.glob("scope-*.zip"), *folder.glob("scope-*.cdx.json")} - kept:
+        old.unlink()  # of other sources; what else lies here is not of this program
     if not args.any_blender:
         check_listing(folder, targets)
     return 0
@@ -464,11 +467,14 @@ def check(archive: Path, target: Target) -> None:
 
 def check_listing(folder: Path, targets: list[Target]) -> None:
     """List the zips as an extension repository does: every one must be listed, and no Blender may
-    fit two.
+    fit two. Blender's tool lists in the order of the file system; here, it is that of the names.
     """
     said = blender_extension("server-generate", "--repo-dir", str(folder))
     listing = folder / "index.json"
-    entries = json.loads(listing.read_text("utf-8"))["data"]
+    stated = json.loads(listing.read_text("utf-8"))
+    entries = stated["data"]
+    entries.sort(key=lambda entry: entry["archive_url"])
+    listing.write_text(json.dumps(stated, indent=2) + "\n", "utf-8")
     found = sorted(
         (e["platforms"], e["blender_version_min"], e.get("blender_version_max")) for e in entries
     )

@@ -209,7 +209,15 @@ def test_a_zips_manifest_names_every_licence_of_its_bill_and_keeps_the_rest(buil
 @pytest.mark.usefixtures("networks")
 def test_six_zips_with_empty_wheels(with_empty_wheels, monkeypatch, capsys, tmp_path):
     builder = with_empty_wheels
+    builder.DIST.mkdir()
+    (builder.DIST / "scope_solver-0.1.0-py3-none-any.whl").write_text("made by another script")
+    (builder.DIST / "scope-0.0.1-blender_5.1-linux_x64.zip").write_text("of other sources")
     assert run(builder, monkeypatch, "--website", "https://example.com/scope") == 0
+    assert len(list(builder.DIST.glob("*.whl"))) == 1
+    listed = json.loads((builder.DIST / "index.json").read_text("utf-8"))["data"]
+    addresses = [entry["archive_url"] for entry in listed]
+    assert len(addresses) == 6
+    assert addresses == sorted(addresses)
     archives = sorted(p.name for p in builder.DIST.glob("*.zip"))
     version = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["version"]
     blenders = ("blender_4.2_before_5.1", "blender_5.1")
