@@ -207,19 +207,29 @@ def _choose(path: Path, rigs: list[Object], name: str) -> Object:
     """Choose the armature of a file.
 
     :param name: may be empty if there is only one.
-    :raises InputError: when there is none.
+    :raises InputError: when there is none, or it is linked from another file.
     :raises UsageError: when there are several, or none has that name.
     """
+    rigs = sorted(rigs, key=lambda rig: rig.name)
+    for rig in rigs:
+        if rig.name == name:
+            return rig
+    linked = [
+        obj
+        for obj in bpy.data.objects
+        if obj.type == "ARMATURE" and obj.library is not None and name in ("", obj.name)
+    ]
+    if linked and (name or not rigs):
+        raise InputError(
+            f"{path}: '{linked[0].name}' is linked from {linked[0].library.filepath}; choose that "
+            "file, or make an override of it (Object > Library Override > Make) in this one"
+        )
     if not rigs:
         raise InputError(
             f"{path}: there is no armature in this file; choose the file that holds your rig"
         )
-    rigs = sorted(rigs, key=lambda rig: rig.name)
     names = ", ".join(f"'{rig.name}'" for rig in rigs)
     if name:
-        for rig in rigs:
-            if rig.name == name:
-                return rig
         raise UsageError(
             f"{path} has no armature '{name}', only {names}; give one of them with --rig-object"
         )

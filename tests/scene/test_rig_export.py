@@ -275,6 +275,26 @@ def test_a_file_without_an_armature_is_refused(tmp_path):
         check_rig(rig_source(tmp_path / "rig.blend"))
 
 
+@pytest.mark.parametrize("instanced", [False, True])
+def test_a_linked_rig_is_refused_with_the_file_that_it_is_linked_from(tmp_path, instanced):
+    save_rig(tmp_path / "hero.blend")
+    with bpy.data.libraries.load(str(tmp_path / "hero.blend"), link=True) as (there, here):
+        here.objects = list(there.objects)
+    collection = bpy.data.collections.new("Hero") if instanced else bpy.context.scene.collection
+    for obj in here.objects:
+        collection.objects.link(obj)
+    if instanced:
+        empty = bpy.data.objects.new("Hero", None)
+        empty.instance_type = "COLLECTION"
+        empty.instance_collection = collection
+        bpy.context.scene.collection.objects.link(empty)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    for name in ("", "Rig0"):
+        with pytest.raises(InputError, match=r"shot\.blend: 'Rig0' is linked from .*hero\.blend;"):
+            check_rig(rig_source(tmp_path / "shot.blend", armature=name))
+
+
 def test_a_file_with_thousands_of_bones_is_refused_before_they_are_probed(tmp_path, monkeypatch):
     """A .blend file says it only when it is read, unlike the formats that are imported."""
     save_rig(tmp_path / "rig.blend", armatures=1)
