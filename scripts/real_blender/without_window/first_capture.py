@@ -92,6 +92,11 @@ def main() -> None:
     found = {"first_s": first, "second_s": second, "compiled_here": len(kept)}
     found |= {"stages_first_s": first_stages, "stages_second_s": second_stages}
     print(json.dumps(found), flush=True)
+    Path("/scope/out/first.json").write_text(json.dumps(found, indent=1))
+    extension = Path(str(import_module(NAME).__file__)).parent
+    if not any(extension.glob("assets/kernels/*/*.code")):  # as with Debian's newest Python
+        assert second_stages.get(COMPILING, 0.0) > 0.0, f"compiling was not shown: {second_stages}"
+        return
     assert not kept, f"the extension comes without {kept}"
     assert COMPILING not in second_stages, second_stages
     assert first < 2.0 * second + MAX_LONGER_S, found
