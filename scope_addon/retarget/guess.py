@@ -407,6 +407,10 @@ def _pelvis(rest: RestPose, thighs: list[int], chest: int | None, named: list[in
         # A root at the feet carries the goals of a control rig, too.
         if shared is not None and shared not in bones and not _is_at_feet(rest, shared, thighs):
             return shared
+    if named and chest is not None:
+        # Beside the spine, the hips are carried by what carries both, as a centre of gravity.
+        shared = rest.shared([named[0], chest])
+        return named[0] if shared is None or _is_at_feet(rest, shared, thighs) else shared
     shared = rest.shared(thighs)
     return named[0] if named else shared if shared not in thighs else None
 

@@ -15,7 +15,7 @@ from contextlib import AbstractContextManager, contextmanager
 
 import bpy
 import numpy as np
-from bpy.types import Constraint, FCurve, Object, PoseBone
+from bpy.types import Bone, Constraint, FCurve, Object, PoseBone
 from mathutils import Matrix, Quaternion
 
 from ...solver.errors import InputError
@@ -149,6 +149,7 @@ def _check_carried(
     :raises InputError: when a bone does not move with the one that should carry it.
     """
     bone_of = {parts[name]: index for index, name in enumerate(names)}
+    apart: list[tuple[str, str]] = []  # parts and those that should carry them
     for part, bone in bone_of.items():
         side, _, kind = part.partition("_")
         above = f"{side}_{_CARRIED_BY[kind]}" if kind in _CARRIED_BY else "pelvis"
@@ -158,17 +159,41 @@ def _check_carried(
         while carrying >= 0 and carrying != bone_of[above]:
             carrying = int(carriers[carrying])
         if carrying < 0:
-            lower = rig.data.bones[names[bone]]
-            upper = names[bone_of[above]]
-            chain = [lower.name, *(each.name for each in lower.parent_recursive)]
-            between = chain[: chain.index(upper)] if upper in chain else chain[:1]
-            held = _controlling(rig, [*between, upper]) or _controlling(rig, chain)
-            parts_in_words = f"{part} and {above}".replace("_", " ")
-            reason = f": mute {held}, or" if held else f", so they cannot be {parts_in_words};"
-            raise InputError(
-                f"'{lower.name}' of '{rig.name}' does not move with '{upper}'{reason} choose other "
-                "bones in the bone map"
-            )
+            apart.append((part, above))
+    if apart:
+        _refuse_apart(rig, apart, {part: rig.data.bones[names[b]] for part, b in bone_of.items()})
+
+
+def _refuse_apart(rig: Object, apart: list[tuple[str, str]], bone_of: dict[str, Bone]) -> None:
+    """Refuse a rig in which parts do not move with those that should carry them, naming all that
+    has to be muted, or the bone that carries both.
+
+    :raises InputError: always.
+    """
+    near: list[Bone] = []
+    chains: list[list[Bone]] = []
+    for part, above in apart:
+        chain = [bone_of[part], *bone_of[part].parent_recursive]
+        upper = bone_of[above]
+        near += [*(chain[: chain.index(upper)] if upper in chain else chain[:1]), upper]
+        chains.append(chain)
+    held = _controlling(rig, [bone.name for bone in near]) or _controlling(
+        rig, [bone.name for chain in chains for bone in chain]
+    )
+    part, above = apart[0]
+    lower, upper = bone_of[part], bone_of[above]
+    reason = f": mute {held}, or"
+    advice = ""
+    if not held:
+        reason = f", so they cannot be {part} and {above};".replace("_", " ")
+        for bone in upper.parent_recursive if above == "pelvis" else ():
+            if all(bone in chain for chain in chains):
+                advice = f", such as '{bone.name}' for the pelvis"
+                break
+    raise InputError(
+        f"'{lower.name}' of '{rig.name}' does not move with '{upper.name}'{reason} choose other "
+        f"bones in the bone map{advice}"
+    )
 
 
 def _dependencies(
@@ -179,6 +204,7 @@ def _dependencies(
     :param rest: (B, 4, 4) bones to world at rest.
     :return: (B, B) whether the row's bone rotates with the column's, and whether its head moves
         with it.
+    :raises InputError: when bones do not rotate.
     """
     names = list(parts)
     armature_from_world = np.linalg.inv(np.array(rig.matrix_world, float))
@@ -186,6 +212,7 @@ def _dependencies(
     follows = np.zeros((len(names), len(names)), bool)
     carried = follows.copy()
     heads = rest[:, :3, 3]
+    blocked: list[str] = []  # at rest, other bones would seem to follow them
     for group in _independent(parts):
         # with different angles, to distinguish which bone another one follows
         for k, a in enumerate(group):
@@ -193,8 +220,9 @@ def _dependencies(
             rig.pose.bones[names[a]].matrix_basis = turn.to_matrix().to_4x4()
         posed = armature_from_world @ _matrices(rig, names)
         turned = unscaled(posed[:, :3, :3]) @ transposed(unscaled(rest[:, :3, :3]))
-        _check_rotated(rig, [names[a] for a in group], turned[group])
         for a in group:
+            if np.abs(turned[a] - np.eye(3)).max() < _MIN_RESPONSE:
+                blocked.append(names[a])
             rig.pose.bones[names[a]].matrix_basis = Matrix()
             follows[:, a] = np.abs(turned - turned[a]).max(axis=(1, 2)) < 0.02
             away = heads - heads[a]
@@ -206,6 +234,8 @@ def _dependencies(
                 off < moved
             )
             follows[a, a] = carried[a, a] = False
+    if blocked:
+        _refuse_blocked(rig, blocked, names)
     return follows, carried
 
 
@@ -247,24 +277,20 @@ def _floor(rig: Object, rest: RestPose, parts: dict[str, str]) -> float:
     return float(origin if abs(lowest - origin) < _MAX_LIFT * rest.size else lowest)
 
 
-def _check_rotated(rig: Object, names: list[str], turned: Float64Array) -> None:
-    """Check that the probe rotated these bones; other bones at rest would seem to follow one that
-    did not.
+def _refuse_blocked(rig: Object, blocked: list[str], names: list[str]) -> None:
+    """Refuse a rig in which bones do not rotate, naming all that has to be muted.
 
-    :param turned: (B, 3, 3) the rotation of each of these bones.
-    :raises InputError: when one did not rotate.
+    :param names: of all mapped bones; constraints may turn more of them than those that stay still.
+    :raises InputError: always.
     """
-    blocked = [
-        name
-        for name, R in zip(names, turned, strict=True)
-        if np.abs(R - np.eye(3)).max() < _MIN_RESPONSE
-    ]
-    if blocked:
-        raise InputError(
-            f"'{blocked[0]}' of '{rig.name}' does not move when it is rotated: show the rig in the "
-            f"viewport, mute {_controlling(rig, blocked[:1]) or _UNKNOWN}, or remove the bone from "
-            "the list"
-        )
+    bones = ", ".join(f"'{name}'" for name in blocked)
+    held = held_bones(rig).intersection(names)
+    one = len(blocked) == 1
+    raise InputError(
+        f"{bones} of '{rig.name}' {'does' if one else 'do'} not move when rotated: mute "
+        f"{_controlling(rig, held.union(blocked)) or _UNKNOWN}, or remove "
+        f"{'the bone' if one else 'these bones'} from the list"
+    )
 
 
 def _check_root_moves(rig: Object, name: str) -> None:

@@ -107,6 +107,26 @@ def test_a_rig_has_the_same_map_whichever_way_it_is_turned(drop: float, tilt: fl
         assert found.parts == part_of, np.degrees(angle)
 
 
+@pytest.mark.parametrize("scheme", ["mixamo", "unreal", "smpl"])
+def test_the_bone_that_carries_hips_and_spine_is_the_pelvis(scheme: str) -> None:
+    """Legs hang from the root and follow the hips by constraints; only a root on the floor carries
+    hips and spine in another rig, so there, the hips remain.
+    """
+    bones, part_of = bones_of(scheme)
+    bone_of = {part: bone for bone, part in part_of.items()}
+    hips, spine, *thighs = (
+        bones.names.index(bone_of[part]) for part in ("pelvis", "spine1", "left_hip", "right_hip")
+    )
+    heads = np.concatenate([[[0.0, 0.0, 0.0], bones.heads[hips]], bones.heads])
+    for carrying, pelvis in ((1, "COG"), (0, bone_of["pelvis"])):
+        parents = np.where(bones.parents < 0, -1, bones.parents + 2)
+        parents[thighs] = 0
+        parents[[hips, spine]] = carrying
+        found = guess(RestPose(["root", "COG", *bones.names], np.array([-1, 0, *parents]), heads))
+        expected = {bone: part for bone, part in part_of.items() if part != "pelvis"}
+        assert found.parts == expected | {pelvis: "pelvis"}
+
+
 def test_a_tail_does_not_tell_the_sides() -> None:
     """Though it is longer than the arms."""
     bones, part_of = bones_of("nameless", drop=0.8)

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.retarget.bone_map import BoneMap
 from scope.scope_addon.scene.export.export import ExportOptions
@@ -346,6 +346,51 @@ def test_an_ik_constraint_that_holds_a_limb_and_what_carries_it_is_named(
         run(source, rig)
     constraint.mute = True
     assert run(source, rig).warnings == []
+
+
+def test_all_constraints_that_hold_legs_are_named_at_once(source):
+    """IK of both, and the feet's rotations by its controls; or IK that holds them in part."""
+    rig, bone_of = build_rig("unreal")
+    ik = []
+    for side in ("left", "right"):
+        target = added_empty(side)
+        foot = rig.data.bones[bone_of[f"{side}_ankle"]]
+        target.location = rig.matrix_world @ foot.head_local
+        constraint = rig.pose.bones[bone_of[f"{side}_knee"]].constraints.new("IK")
+        constraint.name = f"{side} leg"
+        constraint.target = target
+        constraint.chain_count = 3
+        ik.append(constraint)
+        constraint = rig.pose.bones[bone_of[f"{side}_ankle"]].constraints.new("COPY_ROTATION")
+        constraint.name = f"{side} foot"
+        constraint.target = target
+    with pytest.raises(InputError, match="mute the constraints") as caught:
+        run(source, rig)
+    for named in ("left leg", "right leg", "left foot", "right foot"):
+        assert f"'{named}' of" in str(caught.value)
+    for constraint in ik:
+        constraint.influence = 0.5
+    for side in ("left", "right"):
+        rig.pose.bones[bone_of[f"{side}_ankle"]].constraints[0].mute = True
+    with pytest.raises(InputError, match="'left leg' of 'calf_l' and 'right leg' of 'calf_r'"):
+        run(source, rig)
+
+
+def test_the_bone_that_carries_hips_and_spine_is_proposed_for_the_pelvis(source):
+    rig, bone_of = build_rig("unreal")
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    bones = rig.data.edit_bones
+    carrying = bones.new("COG")
+    carrying.head = bones["pelvis"].head
+    carrying.tail = carrying.head + Vector((0.0, 0.2, 0.0))
+    for part in ("pelvis", "spine1"):
+        bones[bone_of[part]].use_connect = False
+        bones[bone_of[part]].parent = carrying
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bone_map = BoneMap({bone: part for part, bone in bone_of.items()})
+    with pytest.raises(InputError, match="does not move with 'pelvis'.*, such as 'COG' for the pe"):
+        run(source, rig, bone_map=bone_map)
 
 
 def with_deform_bones(rig):
