@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A zip's bill of materials: every package, every library inside its wheels, and every network and
-body, with hashes.
+body, and the compiled solver, with hashes.
 
 The format is CycloneDX 1.6 in JSON. Wheels and their files are read; scripts/native_libraries.toml
 says what a library is and under which licence. A wheel with a library that is not listed there is
@@ -21,6 +21,7 @@ from datetime import datetime
 from email.message import Message
 from email.parser import Parser
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from cyclonedx.model import HashAlgorithm, HashType, Property
 from cyclonedx.model.bom import Bom, BomMetaData
@@ -31,7 +32,7 @@ from packageurl import PackageURL
 
 TABLE = tomllib.loads(Path(__file__).with_name("native_libraries.toml").read_text("utf-8"))
 PROJECTS = TABLE["projects"]
-# The assets that are data rather than code or documentation, and the licence of each folder.
+# The assets that are not sources or documentation, and the licence of each folder.
 ASSETS = {
     "assets/networks/*.onnx": "Apache-2.0",
     "assets/lifter/*.onnx": "GPL-3.0-or-later",
@@ -39,11 +40,16 @@ ASSETS = {
     "assets/face/*.npz": "GPL-3.0-or-later",
     "assets/face/controls/*.json": "CC0-1.0",
     "assets/body/*.npz": "CC0-1.0",
+    "assets/kernels/*": "GPL-3.0-or-later AND Apache-2.0",
     "assets/sample/*.mp4": "CC0-1.0",
 }
 # of the serial numbers, each made from the content
 _NAMESPACE = uuid.UUID("5a3bb3f0-6b5e-4a5c-9d0e-0f3c5a9b1d27")
 _EXTENSION_MODULE = re.compile(r"(\.(abi3|cpython-[\w-]+)\.so|\.pyd)$")
+# What names the file of its debugging information, in distributions with RPM packages; and the
+# version of a product in the resources of a file for Windows, in UTF-16.
+_OF_PACKAGE = rb"\.so\.[\d.]+-(\d[\w.]*-[\w.]+)\.x86_64\.debug"
+_OF_RESOURCE = "ProductVersion".encode("utf-16-le") + rb"\0{2,4}((?:\d\0)+(?:\.\0(?:\d\0)+)+)\0\0"
 _SHORT = {"opencv-contrib-python-headless": "opencv"}  # in THIRD_PARTY.md
 _LIBRARY = re.compile(r"^(?P<name>.+?)\.(so|dylib|dll)(?P<end>[.\d]*)$")
 
@@ -53,12 +59,13 @@ class Library:
     """A library inside a wheel.
 
     :param project: its name in native_libraries.toml.
-    :param version: as its file states it, or the number in the file's name; empty if there is
-        neither.
+    :param version: of its release, as its files state it; empty if they do not.
+    :param soname: the number in the file's name, which is another one: that of the interface.
     """
 
     project: str
     version: str
+    soname: str
     licence: str
     file: str
     sha256: str
@@ -97,26 +104,46 @@ def libraries(package: str, files: Iterable[tuple[str, bytes]]) -> list[Library]
     for file, content in files:
         digest = hashlib.sha256(content).hexdigest()
         found += [
-            (project, version, file, digest)
+            (project, version, "", file, digest)
             for project, version in _inside_opencv(package, file, content)
         ]
         parts = library_name(file)
         if parts is None:
             continue
-        name, version = parts
+        name, number = parts
         if name not in by_file:
             raise _unlisted(package, file)
         project = by_file[name]
-        pattern = PROJECTS[project].get("version")
-        if pattern and (match := re.search(pattern.encode(), content)):
-            stated[project] = match[1].decode()
-        found.append((project, version, file, digest))
+        entry = PROJECTS[project]
+        version = _stated_version(entry, content)
+        if version and not entry.get("several"):
+            stated[project] = version
+        if entry.get("named"):
+            version = version or number
+            number = ""
+        found.append((project, version, number, file, digest))
     projects = {project for project, *_ in found}
     made = []
-    for project, version, file, digest in found:
-        version = stated.get(project, version)  # of all files of a project, one may state it
-        made.append(Library(project, version, _licence(project, version, projects), file, digest))
+    for project, own, number, file, digest in found:
+        version = own or stated.get(project, "")  # of all files of a project, one may state it
+        licence = _licence(project, version, projects)
+        made.append(Library(project, version, number, licence, file, digest))
     return sorted(made, key=lambda library: (library.project.lower(), library.file))
+
+
+def _stated_version(entry: dict[str, Any], content: bytes) -> str:
+    """Return the version of the release that a library's file states; empty if it does not, or if
+    what looks like one is not unique.
+
+    :param entry: of its project in native_libraries.toml.
+    """
+    patterns = entry.get("version", [])
+    searched = [patterns] if isinstance(patterns, str) else patterns
+    for pattern in (*(text.encode() for text in searched), _OF_PACKAGE, _OF_RESOURCE):
+        versions = {match.replace(b"\0", b"").decode() for match in re.findall(pattern, content)}
+        if len(versions) == 1:
+            return versions.pop()
+    return ""
 
 
 def _inside_opencv(package: str, file: str, content: bytes) -> Iterator[tuple[str, str]]:
@@ -208,14 +235,20 @@ def wheel_component(wheel: Path) -> tuple[Component, list[Library]]:
 
 
 def _library_component(package: str, library: Library) -> Component:
+    name = shown_name(library)
+    version = library.version or None
+    properties = [Property(name="scope:file", value=library.file)]
+    if library.soname:
+        properties.append(Property(name="scope:soname", value=library.soname))
     return Component(
-        name=shown_name(library),
-        version=library.version or None,
+        name=name,
+        version=version,
         type=ComponentType.LIBRARY,
         bom_ref=f"{package}/{library.file}#{library.project}",
+        purl=PackageURL("generic", name=name.lower(), version=version) if version else None,
         licenses=[LicenseExpression(library.licence)],
         hashes=[_sha256(library.sha256)],
-        properties=[Property(name="scope:file", value=library.file)],
+        properties=properties,
     )
 
 
@@ -300,10 +333,10 @@ def check_third_party(
 
 
 def _asset_component(name: str, path: Path, licence: str) -> Component:
-    network = path.suffix == ".onnx"
+    kinds = {".onnx": ComponentType.MACHINE_LEARNING_MODEL, ".code": ComponentType.FILE}
     return Component(
         name=name,
-        type=ComponentType.MACHINE_LEARNING_MODEL if network else ComponentType.DATA,
+        type=kinds.get(path.suffix, ComponentType.DATA),
         bom_ref=name,
         licenses=[LicenseExpression(licence)],
         hashes=[_sha256(hashlib.sha256(path.read_bytes()).hexdigest())],

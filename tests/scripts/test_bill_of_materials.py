@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import json
+import sys
 import zipfile
 from datetime import UTC, datetime
 from importlib import metadata
+from pathlib import Path
 
 import pytest
 
@@ -15,6 +18,7 @@ from .script_modules import ROOT, script
 
 SHIPPED = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless", "av")
 MADE = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+OPUS = b"\0libopus 1.6.1\0"
 BUILD_INFORMATION = (
     b"General configuration for OpenCV 9\n  3rdparty dependencies:       %s\n  PNG:  build (ver "
     b"1.6.43)\n"
@@ -60,11 +64,11 @@ def extension(tmp_path):
     staged = tmp_path / "staged"
     (staged / "assets" / "networks").mkdir(parents=True)
     (staged / "assets" / "networks" / "pose.onnx").write_bytes(b"network")
+    (staged / "assets" / "kernels" / "part").mkdir(parents=True)
+    (staged / "assets" / "kernels" / "part" / "kernel.code").write_bytes(b"code")
     (staged / "blender_manifest.toml").write_text('version = "0.1.0"\n')
     (staged / "THIRD_PARTY.md").write_text("| Opus | BSD-3-Clause | made L |\n")
-    return staged, [
-        wheel(tmp_path, "made", "1.0", {"made.libs/libopus-0123abcd.so.0.11.1": b"opus"})
-    ]
+    return staged, [wheel(tmp_path, "made", "1.0", {"made.libs/libopus-0123abcd.so.0.11.1": OPUS})]
 
 
 @pytest.mark.parametrize(
@@ -116,6 +120,81 @@ def test_licences_that_conflict_with_ours_are_named(bills, installed):
         assert name in said
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the libraries are of Linux")
+def test_versions_are_those_that_the_libraries_themselves_return(installed):
+    """Of libraries that say it in a function or a variable; the number in a file's name is
+    another.
+    """
+    where = metadata.distribution("av").locate_file("")
+    files = {library.project: library for library in installed["av"]}
+    functions = {
+        "dav1d": "dav1d_version",
+        "LAME": "get_lame_version",
+        "ALSA": "snd_asoundlib_version",
+        "Opus": "opus_get_version_string",
+        "SVT-AV1": "svt_av1_get_version",
+        "libvpx": "vpx_codec_version_str",
+    }
+    said = {}
+    for project, name in functions.items():
+        function = getattr(ctypes.CDLL(str(where / files[project].file)), name)
+        function.restype = ctypes.c_char_p
+        said[project] = function().decode().removeprefix("libopus ").removeprefix("v")
+    for project, name in {"GMP": "__gmp_version", "x265": "x265_version_str"}.items():
+        library = ctypes.CDLL(str(where / files[project].file))
+        said[project] = ctypes.c_char_p.in_dll(library, name).value.decode()
+    assert {project: files[project].version for project in said} == said
+    assert all(files[project].soname != files[project].version for project in ("GMP", "x265"))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the packages are of Linux")
+def test_versions_of_a_distributions_packages_are_those_that_the_wheels_own_bill_states(installed):
+    files = metadata.files("av")
+    (own,) = [file for file in files if str(file).endswith("sboms/auditwheel.cdx.json")]
+    stated = {part["name"]: part["version"] for part in json.loads(own.read_text())["components"]}
+    for library in installed["av"]:
+        name = Path(library.file).name.partition("-")[0]
+        if name in stated:
+            assert library.version == stated[name]
+    assert {"libxcb", "libXau", "libdrm"} <= set(stated)
+
+
+def test_a_number_in_a_files_name_is_no_version(bills):
+    """Except for projects of which it is known; what looks like several versions is none."""
+    libraries = {
+        library.project: (library.version, library.soname)
+        for library in bills.libraries(
+            "made",
+            [
+                ("made.libs/libnettle-0a1b2c3d.so.8.11", b""),
+                ("made.libs/libgmp-0a1b2c3d.so.10.5.0", b"\x006.3.0\x00"),
+                ("made.libs/libasound-0a1b2c3d.so.2.0.0", b"\x001.2.14\x00, not \x001.0.0\x00"),
+                ("made/.dylibs/libzstd.1.5.6.dylib", b""),
+                (
+                    "made.libs/libiconv-2-0a1b2c3d.dll",
+                    "ProductVersion\x001.19\0\0".encode("utf-16-le"),
+                ),
+                ("made.libs/libX11.6.dylib", b"/Cellar/libx11/1.8.10/share"),
+                (
+                    "made.libs/libdrm-0a1b2c3d.so.2.4.0",
+                    b"libdrm.so.2.4.0-2.4.115-2.el8.x86_64.debug",
+                ),
+            ],
+        )
+    }
+    assert libraries == {
+        "ALSA": ("", "2.0.0"),
+        "GMP": ("6.3.0", "10.5.0"),
+        "Nettle": ("", "8.11"),
+        "Zstandard": ("1.5.6", ""),
+        "libiconv": ("1.19", "2"),
+        "X11": ("1.8.10", "6"),
+        "libdrm": ("2.4.115-2.el8", "2.4.0"),
+    }
+
+
 def test_every_listed_library_is_documented(bills):
     text = (ROOT / "THIRD_PARTY.md").read_text("utf-8")
     for project in bills.PROJECTS:
@@ -147,22 +226,27 @@ def test_a_bill_is_valid_and_has_all_parts(bills, extension):
     parts = {part["name"]: part for part in bill["components"]}
     made = parts["made"]
     network = parts["assets/networks/pose.onnx"]
+    code = parts["assets/kernels/part/kernel.code"]
+    assert code["licenses"] == [{"expression": "GPL-3.0-or-later AND Apache-2.0"}]
+    assert code["hashes"] == [{"alg": "SHA-256", "content": hashlib.sha256(b"code").hexdigest()}]
     assert made["purl"] == "pkg:pypi/made@1.0?file_name=made-1.0-py3-none-any.whl"
     assert made["licenses"] == [{"expression": "MIT"}]
     assert made["hashes"] == [
         {"alg": "SHA-256", "content": hashlib.sha256(wheels[0].read_bytes()).hexdigest()}
     ]
     (opus,) = made["components"]
-    assert (opus["name"], opus["version"], opus["licenses"]) == (
+    assert (opus["name"], opus["version"], opus["purl"]) == (
         "Opus",
-        "0.11.1",
-        [{"expression": "BSD-3-Clause"}],
+        "1.6.1",
+        "pkg:generic/opus@1.6.1",
     )
-    assert opus["hashes"] == [{"alg": "SHA-256", "content": hashlib.sha256(b"opus").hexdigest()}]
+    assert opus["licenses"] == [{"expression": "BSD-3-Clause"}]
+    assert {"name": "scope:soname", "value": "0.11.1"} in opus["properties"]
+    assert opus["hashes"] == [{"alg": "SHA-256", "content": hashlib.sha256(OPUS).hexdigest()}]
     assert network["type"] == "machine-learning-model"
     assert network["licenses"] == [{"expression": "Apache-2.0"}]
     assert network["hashes"] == [
         {"alg": "SHA-256", "content": hashlib.sha256(b"network").hexdigest()}
     ]
     (needed,) = [d["dependsOn"] for d in bill["dependencies"] if d["ref"] == "scope"]
-    assert needed == sorted([made["bom-ref"], network["bom-ref"]])
+    assert needed == sorted([made["bom-ref"], network["bom-ref"], code["bom-ref"]])
