@@ -6,7 +6,8 @@
 
 where r_p are the corrected points, in the image or in space, and held points: other hands, feet and
 the head, which should stay where they were. The joints of the corrected limb are free to turn, all
-others are stiff. The skin of the feet has a one-sided residual, which keeps it above the floor.
+others are stiff. A one-sided residual keeps the skin of the feet above the floor, and where the
+trunk is moved that of all parts.
 
 A pin can only be followed as far as the limb reaches. One that is farther away than the limb is
 long would otherwise be met by moving the whole body. So the pin is moved towards the limb's first
@@ -48,7 +49,7 @@ from ...solver.residuals import joint_limits
 from ...solver.tree import with_fixed_shape
 from ..arrays import Float64Array, FloatArray, unit_vectors
 from ..errors import UsageError
-from ..kinematics.contact_points import SOLES, with_contact_points
+from ..kinematics.contact_points import FOOT_PARTS, SOLES, with_contact_points
 from ..kinematics.foot_skin import UNDER_FLOOR_M, FootSkin
 
 # Inverse variances: per radian² of joints, per metre² of points and of the pelvis, per squared
@@ -87,8 +88,9 @@ class Points:
     numbers: list[int] = field(default_factory=list)
     values: list[Float64Array] = field(default_factory=list)  # (3,) metres, or (2,) pixels
     weights: list[float] = field(default_factory=list)
-    # The feet's skin stays above this height; None: it may be anywhere.
-    floor: float | None = None
+    # The skin of each of `PoseRefit.skin`'s parts stays above its height here (N,), −∞ if it may be
+    # anywhere; None: all may.
+    floor: Float64Array | None = None
 
     def add(self, number: int, value: Float64Array, weight: float) -> None:
         """Add a point.
@@ -149,9 +151,12 @@ class PoseRefit:
         :param betas: (P,) shape coefficients.
         """
         self.betas = np.asarray(betas, float)
-        self.skin = FootSkin(body, betas)
-        self.body, self._skin_points = self.skin.as_keypoints(with_contact_points(body, betas))
         self.names = body.joint_names
+        # The feet come first.
+        others = [name for name in self.names if name not in FOOT_PARTS]
+        self.skin = FootSkin(body, betas, [*FOOT_PARTS, *others])
+        self.body, self._skin_points = self.skin.as_keypoints(with_contact_points(body, betas))
+        self._skin_counts = [len(points) for points in self.skin.points]
         self._tree = with_fixed_shape(make_tree(self.body), self.betas)
         self._options = _options()
         self._points = len(self.body.keypoint_names)
@@ -230,9 +235,12 @@ class PoseRefit:
             measured.intrinsics = camera[1]
             measured.keypoints2d = Keypoints2D(numbers[in_image], uv, weights[in_image])
         if points.floor is not None:
-            numbers = self._skin_points
-            up = R_camera_world[:, 2]
-            measured.floor = Floor(numbers, up, points.floor - center[2], np.zeros(len(numbers)))
+            heights = np.repeat(points.floor, self._skin_counts)
+            limited = np.isfinite(heights)
+            up = np.tile(R_camera_world[:, 2], (limited.sum(), 1))
+            offsets = heights[limited] - center[2]
+            numbers = self._skin_points[limited]
+            measured.floor = Floor(numbers, up, offsets, np.zeros(len(numbers)))
         state = State(
             R_camera_world @ rotations[0],
             R_camera_world @ (root - center),

@@ -196,9 +196,13 @@ class _Correction:
         )
         R, at, soles = refit.place(clip.rotations[around], clip.root[around])
         lowest = floor + FLOOR_M
-        # Feet may not go below the floor, or below where they were if that is lower.
-        self._floor = np.full(len(clip), lowest)
-        self._floor[around] = np.minimum(lowest, refit.skin.heights(R, at, UP).min(axis=1))
+        # Feet may not go below the floor, or below where they were if that is lower; neither may
+        # the other parts where the trunk is moved.
+        heights = refit.skin.heights(R, at, UP)
+        self._floor = np.full((len(clip), heights.shape[1]), lowest)
+        feet = heights[:, : len(FOOT_PARTS)].min(axis=1, keepdims=True)
+        heights[:, : len(FOOT_PARTS)] = feet
+        self._floor[around] = np.minimum(lowest, heights)
         self._standing = np.zeros((len(clip), soles.shape[1]))
         self._standing[around] = standing_probability(
             soles, UP, times[around], uneven_ground=not np.isfinite(floor)
@@ -298,8 +302,14 @@ class _Correction:
         own = track.joints
         points = Points()
         limb = limb_of(own[0])
-        if not limb.endswith("arm") and np.isfinite(self._floor[key]):
-            points.floor = float(self._floor[key])
+        if not limb.endswith("arm") and np.isfinite(self._floor[key]).all():
+            points.floor = self._floor[key].copy()
+            others = slice(len(FOOT_PARTS), None)
+            if moves_trunk(own):  # What is pinned itself goes where it is pinned.
+                pinned = set().union(*(_parts_that_rest(refit.body, joint) for joint in own))
+                points.floor[others][np.isin(refit.skin.parts[others], list(pinned))] = -np.inf
+            else:
+                points.floor[others] = -np.inf
         # A pinned hip moves over its standing foot; other joints release the limb's own soles.
         free = () if all(joint.endswith("hip") for joint in own) else refit.soles_of(limb)
         is_foot_pinned = any(joint.endswith(("ankle", "foot")) for joint in own)
@@ -327,7 +337,7 @@ class _Correction:
         """
         own = [k for k, part in enumerate(FOOT_PARTS) if limb_of(part) == limb_of(track.joints[0])]
         lowest = heights[:, own].min(axis=1, initial=np.inf)
-        return np.maximum(self._floor[track.span] - lowest, 0.0)[:, None] * UP
+        return np.maximum(self._floor[track.span, 0] - lowest, 0.0)[:, None] * UP
 
     def _share(self, track: _Track, key: int) -> float:
         """Return 1 at a track's pinned keys, fading to 0 at the ends of its span."""
@@ -556,15 +566,20 @@ def lowest_skin(clip: Clip, body: Body, betas: FloatArray, joint: str) -> Float6
 
     :param betas: (P,) shape coefficients.
     """
-    names = body.joint_names
-    found = {joint}
-    if joint == "pelvis":
-        found |= {"left_hip", "right_hip"}
-    if joint.endswith("wrist"):
-        for part in range(names.index(joint) + 1, len(names)):
-            if names[int(body.parents[part])] in found:
-                found.add(names[part])
-    own = np.isin(body.strongest_joints, [names.index(name) for name in found])
+    own = np.isin(body.strongest_joints, list(_parts_that_rest(body, joint)))
     poses = zip(*clip.parts(body, betas), strict=True)
     heights = [body.skin(*pose, betas)[own, 2].min() for pose in poses]
     return np.array(heights)
+
+
+def _parts_that_rest(body: Body, joint: str) -> set[int]:
+    """Return the numbers of the parts whose skin rests where a joint does."""
+    names = body.joint_names
+    found = {names.index(joint)}
+    if joint == "pelvis":
+        found |= {names.index("left_hip"), names.index("right_hip")}
+    if joint.endswith("wrist"):
+        for part in range(names.index(joint) + 1, len(names)):
+            if int(body.parents[part]) in found:
+                found.add(part)
+    return found

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.edit.corrections import Contact, Pin
-from scope.scope_addon.edit.solve_pins import Shot, keys_of_span, missed, resolve
+from scope.scope_addon.edit.solve_pins import Shot, keys_of_span, lowest_skin, missed, resolve
 from scope.scope_addon.errors import UsageError
 from scope.solver.rotations import exp
 
@@ -260,6 +260,23 @@ def test_what_rests_stays_in_one_place_on_the_floor(part):
     changed = np.flatnonzero((rests.root != clip.root).any(1))
     assert changed[0] > 40 - 0.25 * RATE
     assert changed[-1] < 42 + 0.25 * RATE
+
+
+@pytest.mark.parametrize("part", ["back", "seat"])
+def test_nothing_gets_under_the_floor_where_the_body_rests(part):
+    """Of a man who squats with his arms beside him, and is laid down."""
+    rotations = np.tile(np.eye(3), (T, len(NAMES), 1, 1))
+    rotations[:, 0] = TRUTH.rotations[0, 0]
+    squat = {"hip": (-1.7, 0.0, 0.0), "knee": (2.2, 0.0, 0.0), "ankle": (-0.5, 0.0, 0.0)}
+    for side, way in (("left", -1.0), ("right", 1.0)):
+        for name, vector in (squat | {"shoulder": (0.0, 0.0, 1.3 * way)}).items():
+            rotations[:, NAMES.index(f"{side}_{name}")] = exp(np.array(vector))
+    clip = Clip(TRUTH.times, rotations, np.zeros((T, 3)))
+    clip.root[:, 2] += depth(clip)
+    rests = resolve(clip, BODY, BETAS, [Contact(40, 42, part)], SHOT)
+    assert np.abs(rests.root - clip.root)[40:43, 2].min() > 0.1
+    assert depth(rests) < 0.012
+    np.testing.assert_allclose(lowest_skin(rests, BODY, BETAS, "pelvis")[40:43], 0.0, atol=0.004)
 
 
 @pytest.mark.parametrize(("way", "image"), [((1.0, 0.0, 0.0), True), ((-0.96, -0.28, 0.0), False)])
