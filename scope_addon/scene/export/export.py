@@ -196,6 +196,8 @@ def _write_one(
         bones = [b.name for b in armature.data.bones if b.use_deform and b.bbone_segments > 1]
         if bones:
             options.warn(notice("bends_left_out", file=path.name, rig=armature.name, bones=bones))
+        if suffix == ".glb" and armature.matrix_world.determinant() < 0.0:
+            options.warn(notice("mirrored_rig", file=path.name, rig=armature.name))
 
 
 def export_motions(

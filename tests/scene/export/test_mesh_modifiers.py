@@ -100,6 +100,17 @@ def test_bones_that_bend_are_said(tmp_path):
     assert export(tmp_path / "rig.fbx", rig) == []
 
 
+def test_a_mirrored_rig_is_said_of_the_format_that_blender_shows_wrongly(tmp_path):
+    rig, skin = half_a_face()
+    skin.shape_key_clear()
+    assert export(tmp_path / "rig.glb", rig) == []
+    rig.scale.x *= -1.0
+    bpy.context.view_layer.update()
+    (warning,) = export(tmp_path / "rig.glb", rig)
+    assert warning.startswith(f"rig.glb holds '{rig.name}' mirrored")
+    assert export(tmp_path / "rig.fbx", rig) == []
+
+
 def _moving(skin, how):
     """Give the skin a modifier of which the file shows one frame alone."""
     kind = "MIRROR" if how == "after the armature" else "DISPLACE"
