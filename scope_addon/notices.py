@@ -207,9 +207,9 @@ SENTENCES = {
     "into the list",
     "stretched_rig": "'{rig}' has another scale along each axis, which turns its limbs away from "
     "the captured ones: apply the scale of the rig and its meshes (Ctrl A), or scale it evenly",
-    "mirrored_rig": "{file} holds '{rig}' mirrored by its negative scale, which Blender's importer, "
-    "and perhaps others, show wrongly: apply the scale of the rig and its meshes (Ctrl A) before "
-    "retargeting",
+    "mirrored_rig": "{file} holds '{rig}' mirrored by its negative scale, which Blender's "
+    "importer, and perhaps others, show wrongly: apply the scale of the rig and its meshes (Ctrl "
+    "A) before retargeting",
     "posed_bones": "the pose of these bones of '{rig}', which are not in the list, moves or turns "
     "the motion: {bones:names}; clear it in Pose Mode (Alt G, Alt R, Alt S) for the motion as "
     "captured",
