@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The wheel of the solver alone: its code, the built-in bodies, the joint prior, and machine code.
+"""The wheels of the solver alone: its code, the built-in bodies and the joint prior; one for each
+system with machine code as well, and one for all others without.
 
 Machine code is compiled for the system and the Python that run this, and kept in a folder; that of
-other systems and Pythons in the same folder goes into the wheel as well. The same sources and
-machine code give the same bytes.
+other Pythons and systems in the same folder goes into wheels as well. The same sources and machine
+code give the same bytes.
 """
 
 from __future__ import annotations
@@ -43,6 +44,12 @@ ASSETS = (
     "assets/prior/README.md",
     "assets/prior/joint_prior.npz",
 )
+# By system and processor, the wheel's tag: that of numba's wheels. With no machine code, "any".
+PLATFORMS = {
+    "linux-x86_64": "manylinux_2_27_x86_64",
+    "win32-x86_64": "win_amd64",
+    "darwin-arm64": "macosx_12_0_arm64",
+}
 NEEDS = ("numpy", "numba")
 # Optional extras, and the package that each needs for the examples of docs/solver_api.md.
 EXTRAS = {"jax": "jax", "torch": "torch"}
@@ -101,13 +108,13 @@ print(shipped_folder().name)
 
 
 def main() -> int:
-    """Build the wheel; return the exit status."""
+    """Build the wheels; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument(
-        "folder", type=Path, nargs="?", default=ROOT / "build" / "dist", help="for the wheel"
+        "folder", type=Path, nargs="?", default=ROOT / "build" / "dist", help="for the wheels"
     )
     parser.add_argument("--code", type=Path, default=CODE, help="folder of machine code")
-    parser.add_argument("--code-only", action="store_true", help="make no wheel")
+    parser.add_argument("--code-only", action="store_true", help="make no wheels")
     arguments = parser.parse_args()
     if missing := [name for name in NEEDS if importlib.util.find_spec(name) is None]:
         raise SystemExit(
@@ -117,7 +124,9 @@ def main() -> int:
     digest = sources_digest()
     compile_code(arguments.code, digest)
     if not arguments.code_only:
-        print(build_wheel(arguments.folder, arguments.code, digest))
+        for platform in ("any", *PLATFORMS.values()):
+            if made := build_wheel(arguments.folder, arguments.code, digest, platform):
+                print(made)
     return 0
 
 
@@ -154,7 +163,7 @@ def compile_code(folder: Path, digest: str) -> None:
     """Compile the solver with this Python into a folder in `folder`, unless that has been done.
 
     Code of other sources is removed. It is compiled from a copy of the solver without the rest of
-    Scope, whose cache of machine code is another.
+    Scope, whose cache of machine code is another. For some processors, none is shipped.
 
     :param digest: of the sources.
     :raises SystemExit: it could not be compiled, or the sources have changed.
@@ -176,10 +185,10 @@ def compile_code(folder: Path, digest: str) -> None:
             shutil.copy(ROOT / asset, copy / "scope" / asset)
         refuse_changes(digest)
         ask = "from scope.solver import shipped_code as s; print(s.shipped_folder().name); "
-        target, processor = _run(copy, {}, ask + "print(s.shipped_processor())").split()
-        if (folder / target / MADE_FROM).is_file():
+        target, _, processor = _run(copy, {}, ask + "print(s.shipped_processor())").partition("\n")
+        if not processor.strip() or (folder / target / MADE_FROM).is_file():
             return
-        chosen = {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
+        chosen = {"NUMBA_CPU_NAME": processor.strip(), "NUMBA_CPU_FEATURES": ""}
         chosen["NUMBA_CACHE_DIR"] = str(copy / "cache")
         print(f"solver_wheel: compiling for {target}: one or two minutes", file=sys.stderr)
         _run(copy, chosen, WARM_UP, str(folder))
@@ -198,10 +207,13 @@ def _run(packages: Path, variables: dict[str, str], program: str, *arguments: st
     return done.stdout
 
 
-def build_wheel(folder: Path, code: Path, digest: str) -> Path:
-    """Write the wheel with all machine code in a folder, and return its path.
+def build_wheel(folder: Path, code: Path, digest: str, platform: str = "any") -> Path | None:
+    """Write the wheel of a platform, and return its path; None where there is no machine code of
+    it.
 
+    :param code: folder of machine code.
     :param digest: of the sources that the machine code was made from.
+    :param platform: the tag; ``any`` for the wheel without machine code.
     :raises SystemExit: the sources have changed since; nothing is written.
     """
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -228,18 +240,31 @@ def build_wheel(folder: Path, code: Path, digest: str) -> Path:
     files |= {f"scope/{asset}": ROOT / asset for asset in ASSETS}
     files["scope/__init__.py"] = ROOT / "__init__.py"
     files |= {f"{information}/licenses/{name}": ROOT / path for name, path in LICENCES.items()}
-    for path in sorted(code.glob("*/*.nb[ic]")):
-        files[f"scope/solver/machine_code/{path.parent.name}/{path.name}"] = path
+    found = [
+        path
+        for system, tag in PLATFORMS.items()
+        for path in sorted(code.glob(f"{system}-*/*.nb[ic]"))
+        if tag == platform
+    ]
+    is_pure = platform == "any"
+    if not (found or is_pure):
+        return None
+    files |= {f"scope/solver/machine_code/{p.parent.name}/{p.name}": p for p in found}
     contents = {name: path.read_bytes() for name, path in files.items()}
     refuse_changes(digest)
     contents[f"{information}/METADATA"] = ("\n".join(metadata) + f"\n\n{readme}").encode()
-    wheel = "Wheel-Version: 1.0\nGenerator: scope\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
-    contents[f"{information}/WHEEL"] = wheel.encode()
+    wheel = [
+        "Wheel-Version: 1.0",
+        "Generator: scope",
+        f"Root-Is-Purelib: {str(is_pure).lower()}",
+        f"Tag: py3-none-{platform}",
+    ]
+    contents[f"{information}/WHEEL"] = ("\n".join(wheel) + "\n").encode()
     record = [f"{name},{_hash(content)}" for name, content in contents.items()]
     record.append(f"{information}/RECORD,,")
     contents[f"{information}/RECORD"] = ("\n".join(record) + "\n").encode()
     folder.mkdir(parents=True, exist_ok=True)
-    target = folder / f"{NAME}-{version}-py3-none-any.whl"
+    target = folder / f"{NAME}-{version}-py3-none-{platform}.whl"
     made = source_time().timetuple()[:6]
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in contents.items():

@@ -10,11 +10,13 @@ import sys
 import zipfile
 
 import pytest
+from packaging.utils import parse_wheel_filename
 
 from .script_modules import ROOT, script
 
 SOLVER_WHEEL = script("solver_wheel")
-CODE = "machine_code/linux-x86_64-cpython-311/kernel.nbc"
+CODE = "linux-x86_64-cpython-311"
+OTHERS = ("darwin-arm64-cpython-313", "linux-x86_64-cpython-313", "linux-riscv64-cpython-311")
 # Loads what a fit needs besides machine code, which is not compiled here.
 LOAD = """
 import sys
@@ -30,18 +32,46 @@ for name in solver.__all__:
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
-    """The wheel, with a file in place of machine code."""
+def wheels(tmp_path_factory):
+    """The wheels by their platforms, with files in place of machine code."""
     place = tmp_path_factory.mktemp("solver_wheel")
-    made = place / "code" / CODE.removeprefix("machine_code/")
-    made.parent.mkdir(parents=True)
-    made.write_bytes(b"code")
-    (made.parent / "made_from").write_text("sources")
-    return SOLVER_WHEEL.build_wheel(place, place / "code", SOLVER_WHEEL.sources_digest())
+    for name in (CODE, *OTHERS):
+        made = place / "code" / name / "kernel.nbc"
+        made.parent.mkdir(parents=True)
+        made.write_bytes(b"code")
+        (made.parent / "made_from").write_text("sources")
+    digest = SOLVER_WHEEL.sources_digest()
+    return {
+        platform: SOLVER_WHEEL.build_wheel(place, place / "code", digest, platform)
+        for platform in ("any", *SOLVER_WHEEL.PLATFORMS.values())
+    }
 
 
-def test_it_has_the_solver_its_data_and_machine_code_and_nothing_else(wheel):
-    with zipfile.ZipFile(wheel) as archive:
+@pytest.fixture
+def wheel(wheels):
+    """The wheel for Linux."""
+    return wheels["manylinux_2_27_x86_64"]
+
+
+def test_machine_code_is_in_the_wheel_of_its_system_alone(wheels):
+    """As pip reads it: a wheel of pure Python is for every system, those with code are not."""
+    assert wheels["win_amd64"] is None  # for which there is no code
+    inside = {"any": set(), "manylinux_2_27_x86_64": {OTHERS[1], CODE}}
+    inside["macosx_12_0_arm64"] = {OTHERS[0]}
+    for platform, systems in inside.items():
+        with zipfile.ZipFile(wheels[platform]) as archive:
+            names = archive.namelist()
+            (described,) = [name for name in names if name.endswith(".dist-info/WHEEL")]
+            stated = archive.read(described).decode().splitlines()
+        assert {name.split("/")[3] for name in names if "/machine_code/" in name} == systems
+        assert f"Root-Is-Purelib: {'true' if platform == 'any' else 'false'}" in stated
+        (tag,) = parse_wheel_filename(wheels[platform].name)[3]
+        assert f"Tag: {tag}" in stated
+        assert (tag.interpreter, tag.abi, tag.platform) == ("py3", "none", platform)
+
+
+def test_it_has_the_solver_its_data_and_machine_code_and_nothing_else(wheels):
+    with zipfile.ZipFile(wheels["macosx_12_0_arm64"]) as archive:
         names = {name for name in archive.namelist() if ".dist-info/" not in name}
     sources = {
         f"scope/{path.relative_to(ROOT).as_posix()}" for path in (ROOT / "solver").rglob("*.py")
@@ -49,7 +79,7 @@ def test_it_has_the_solver_its_data_and_machine_code_and_nothing_else(wheel):
     data = {
         "scope/__init__.py",
         "scope/solver/py.typed",
-        f"scope/solver/{CODE}",
+        f"scope/solver/machine_code/{OTHERS[0]}/kernel.nbc",
         "scope/assets/body/LICENSE.md",
         "scope/assets/body/growth.npz",
         "scope/assets/body/scope.npz",
@@ -126,6 +156,14 @@ def test_it_works_without_the_rest_of_scope(wheel, tmp_path):
     command = [sys.executable, "-c", LOAD, str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+def test_the_platforms_are_those_of_the_systems_that_code_is_shipped_for():
+    from scope.solver.shipped_code import LEVELS, shipped_folder
+
+    assert {system.partition("-")[2] for system in SOLVER_WHEEL.PLATFORMS} == set(LEVELS)
+    if sys.platform == "linux" and "x86_64" in shipped_folder().name:
+        assert any(shipped_folder().name.startswith(f"{each}-") for each in SOLVER_WHEEL.PLATFORMS)
 
 
 def test_a_python_without_packages_says_what_it_needs():
