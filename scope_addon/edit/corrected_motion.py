@@ -352,9 +352,9 @@ def _frames_between(correction: Contact | Pin, frame: int) -> int:
     return max(correction.first - frame, frame - correction.last, 0)
 
 
-def distance_from_floor(motion: Motion, body: Body, contact: Contact) -> float:
-    """Return how far from the floor a part stays at most that rests there, metres; 0 on uneven
-    ground, whose height is unknown.
+def height_at_rest(motion: Motion, body: Body, contact: Contact) -> float:
+    """Return where a part that rests on the floor is farthest from it, metres above it, negative
+    below; 0 on uneven ground, whose height is unknown.
 
     :param body: the motion's body.
     :param contact: of a part other than a foot.
@@ -363,7 +363,7 @@ def distance_from_floor(motion: Motion, body: Body, contact: Contact) -> float:
     if motion.uneven_ground or not len(rows):
         return 0.0
     clip = clip_from_motion(body, motion, raw=False).rows(rows)
-    heights = [
-        lowest_skin(clip, body, motion.betas, joint) for joint in resting_joints(contact.part)
-    ]
-    return float(np.abs(heights).max())
+    heights = np.ravel(
+        [lowest_skin(clip, body, motion.betas, joint) for joint in resting_joints(contact.part)]
+    )
+    return float(heights[np.abs(heights).argmax()])

@@ -413,19 +413,23 @@ class SCOPE_OT_this_rests(CorrectSpanOperator):
 
     def _off_floor(self, motion: Motion, body: Body) -> str:
         """Return the message about a part that stays away from the floor; empty if it rests."""
-        from ..edit.corrected_motion import corrections_of, distance_from_floor
+        from ..edit.corrected_motion import corrections_of, height_at_rest
         from ..edit.corrections import Contact
 
         own = [c for c in corrections_of(motion) if isinstance(c, Contact) and c.part == self.part]
-        distance = max((distance_from_floor(motion, body, each) for each in own), default=0.0)
-        if distance < _RESTS_M:
+        heights = [height_at_rest(motion, body, each) for each in own]
+        height = max(heights, key=abs, default=0.0)
+        if abs(height) < _RESTS_M:
             return ""
         name = self.properties.bl_rna.properties["part"].enum_items[self.part].name
         return rpt_(
-            "{part} stays up to {distance:.0f} cm from the floor: pin the pelvis, or what keeps it "
-            "there",
+            "{part} stays up to {distance:.0f} cm above the floor: pin the pelvis, or what keeps "
+            "it there"
+            if height > 0
+            else "{part} gets up to {distance:.0f} cm under the floor: remove the pin or contact "
+            "that pulls it there",
             part=iface_(name),
-            distance=100 * distance,
+            distance=100 * abs(height),
         )
 
 

@@ -288,18 +288,28 @@ def test_what_rests_is_on_the_floor_or_it_is_said_how_far_it_stays_away(rig, cap
     """The person walks upright: the body can sit down, but no hand reaches the floor."""
     bpy.ops.scope.this_rests(start=46, end=48, part="left_hand")
     said = capfd.readouterr().out
-    assert re.search(r"Left Hand stays up to \d\d cm from the floor", said)
+    assert re.search(r"Left Hand stays up to \d\d cm above the floor", said)
     (entry,) = listed_corrections(rig)
     assert (entry["text"], entry["first"], entry["last"]) == ("Left Hand", 46, 48)
     bpy.ops.scope.remove_correction(index=0)
     bpy.ops.scope.this_rests(start=46, end=48, part="seat")
-    assert "from the floor" not in capfd.readouterr().out
+    assert "Seat stays" not in capfd.readouterr().out
     body = next(child for child in rig.children if child.type == "MESH")
     bpy.context.scene.frame_set(47)
     evaluated = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
     heights = np.array([(evaluated.matrix_world @ v.co).z for v in evaluated.data.vertices])
     parts = [NAMES.index(name) for name in ("pelvis", "left_hip", "right_hip")]
     assert abs(heights[np.isin(BODY.strongest_joints, parts)].min()) < 0.02
+
+
+@pytest.mark.slow
+def test_what_another_correction_pulls_under_the_floor_is_said_to_be_there(rig, capfd):
+    pelvis = seen(rig, [47])[0, 0]
+    bpy.ops.scope.add_pin(joint="pelvis", frame=47, location=[*pelvis[:2], -0.2])
+    bpy.ops.scope.this_rests(start=46, end=48, part="seat")
+    (depth,) = re.findall(r"Seat gets up to (\d+) cm under the floor", capfd.readouterr().out)
+    assert seen(rig, [47])[0, 0, 2] == pytest.approx(-0.2, abs=0.01)
+    assert 20 < int(depth) < 40
 
 
 def test_an_exchange_swaps_the_sides_and_once_more_swaps_them_back(rig):
