@@ -31,7 +31,7 @@ LARGEST_STEP = 10.0
 _FEWEST_TIMES = 5  # whole numbers that are no coincidence
 _LONGEST_INTERVAL = 2.0  # seconds from one frame of a motion to the next
 _NO_WEIGHTS = np.zeros(0)
-_UNITS = "Scope's unit is the metre; divide millimetres by 1000"
+_UNITS = "Scope's unit is the metre; divide centimetres by 100, millimetres by 1000"
 _FEWEST_POINTS = 4  # that are no coincidence
 _WIDEST = 4.0  # tangent of half a pinhole camera's field of view, 76 degrees
 _LEAST_CONFIDENT = 0.2  # if there is one for all: metres are smaller, of pixels more than 1
@@ -233,16 +233,18 @@ def check_list(value: Any, name: str, what: str) -> None:
         )
 
 
-def warn_of_units(points: Array, name: str) -> None:
+def warn_of_units(points: Array, name: str) -> bool:
     """Warn of points (n, 3) of one person that lie too far apart to be in metres, with
-    `UnitsWarning`.
+    `UnitsWarning`; return whether they do.
     """
-    if _far_apart(points, LARGEST_STEP):
+    are_apart = far_apart(points)
+    if are_apart:
         _warn(
             UnitsWarning,
             f"{name} lie more than {LARGEST_STEP:g} m apart from one to the next, too far for a "
             f"person; {_UNITS}.",
         )
+    return are_apart
 
 
 def warn_of_pixels(K: Array, pixels: Array, normalized: Array) -> None:
@@ -254,7 +256,7 @@ def warn_of_pixels(K: Array, pixels: Array, normalized: Array) -> None:
     fault = _fault_of_pixels(K, pixels, normalized)
     if fault:
         kind, message = _OF_PIXELS[fault]
-        _warn(kind, message.format(fx=K[0, 0], fy=K[1, 1]))
+        _warn(kind, message.format(fx=K[0, 0], fy=K[1, 1], cx=K[0, 2], cy=K[1, 2]))
 
 
 def warn_of_points(points: Array, has_camera: bool, are_weights: bool) -> None:
@@ -296,6 +298,12 @@ _OF_PIXELS = {
     ),
     4: (ScopeWarning, f"Confidence of 2D keypoints {_TOO_CONFIDENT}"),
     5: (
+        ScopeWarning,
+        "Pixels of 2D keypoints lie beyond the image whose centre is the principal point, "
+        "({cx:.6g}, {cy:.6g}); check that the intrinsics belong to pixels of this size, unless the "
+        "image is cropped.",
+    ),
+    6: (
         ScopeWarning,
         "The principal point of the intrinsics is (0, 0), the image's corner; it is mostly half "
         "of the image's size.",
@@ -348,16 +356,19 @@ def warn_of_one_confidence(given: ArrayLike, rows: Array, name: str, sigma: str)
         )
 
 
-def warn_of_distance(points: Array, name: str) -> None:
-    """Warn of points (n, 3) that are too far away to be in metres, with `UnitsWarning`.
+def warn_of_distance(points: Array, name: str) -> bool:
+    """Warn of points (n, 3) that are too far away to be in metres, with `UnitsWarning`; return
+    whether they are.
 
     :param name: with a verb, as a message begins: "Points of foot contacts lie".
     """
     distances = np.abs(points).max(axis=-1, initial=0.0)
     # beyond, they are no millimetres either
     known = distances[distances < _FARTHEST_MM]
-    if len(known) and known.min() > _FARTHEST:
+    is_far = len(known) > 0 and known.min() > _FARTHEST
+    if is_far:
         _warn(UnitsWarning, f"{name} more than {_FARTHEST:g} m away; {_UNITS}.")
+    return is_far
 
 
 def warn_of_deviations(sigmas: Array, least: float, most: float, name: str, unit: str) -> None:
@@ -510,13 +521,15 @@ def _fault_of_intrinsics(K: Array) -> int:
 @kernel
 def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
     """Return 0, or what is wrong: 1 pixels of a normalized image, 2 missing, 3 focal length, 4
-    confidence, 5 principal point.
+    confidence, 5 beyond the image's lower right corner, 6 principal point.
     """
     count = 0
     positive = 0
     small = 0
     missing = 0
     wide = 0
+    right = 0
+    below = 0
     confidence = 0.0
     for k in range(pixels.shape[0]):
         x = pixels[k, 0]
@@ -533,6 +546,10 @@ def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
             positive += 1
         if abs(normalized[k, 0]) > _WIDEST or abs(normalized[k, 1]) > _WIDEST:
             wide += 1
+        if x > 2.0 * K[0, 2] > 0.0:
+            right += 1
+        if y > 2.0 * K[1, 2] > 0.0:
+            below += 1
     if count < _FEWEST_POINTS:
         return 0
     if small == count and K[0, 2] > _NORMALIZED:
@@ -543,8 +560,10 @@ def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
         return 3
     if confidence > _MOST_CONFIDENT * count:
         return 4
+    if 4 * min(right, below) > count:
+        return 5
     in_image = K[0, 0] > _SHORTEST_PX and K[0, 2] == 0.0 and K[1, 2] == 0.0
-    return 5 if in_image and positive == count else 0
+    return 6 if in_image and positive == count else 0
 
 
 @kernel
@@ -582,9 +601,9 @@ def _fault_of_points(points: Array) -> int:
 
 
 @kernel
-def _far_apart(points: Array, most: float) -> bool:
+def far_apart(points: Array) -> bool:
     """Whether more than half of the steps from one finite point of (n, 3) to the next are longer
-    than `most`.
+    than `LARGEST_STEP`.
     """
     steps = 0
     far = 0
@@ -598,7 +617,7 @@ def _far_apart(points: Array, most: float) -> bool:
             for r in range(3):
                 square += (points[k, r] - points[before, r]) ** 2
             steps += 1
-            if square > most * most:
+            if square > LARGEST_STEP**2:
                 far += 1
         before = k
     return 2 * far > steps

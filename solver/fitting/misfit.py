@@ -119,7 +119,8 @@ IMAGE_REMEDIES: list[tuple[str, Change]] = [_FROM_THE_LEFT, _FROM_THE_TOP, _X_BE
 _SPACE_REMEDIES: list[tuple[str, Change]] = [
     (
         f"negate one axis, because x is right, y down and z forward, {_NAMES}, or starts and ends "
-        "of directions",
+        "of directions, or, in views, give R^T and -R^T t of poses R, t from the camera to the "
+        "world",
         _mirrored(axis, in_place),
     )
     for axis in (0, 1)
@@ -235,11 +236,11 @@ def warn_of_mirrored_clip(
 ) -> bool:
     """Warn as `warn_of_mirroring` of frames of which each has its own fit."""
     chosen = some_of(frames)
-    count = sum(fit.measurements for fit in fits)
     return warn_of_mirroring(
         [frames[k] for k in chosen],
         [fits[k].state.R_camera_root for k in chosen],
-        sum(fit.cost for fit in fits) / max(1, count),
+        sum(fit.cost for fit in fits),
+        sum(fit.measurements for fit in fits),
         priors,
         refit,
     )
@@ -249,16 +250,26 @@ def warn_of_mirroring(
     frames: Sequence[Measurements],
     R_camera_root: Sequence[Array],
     cost: float,
+    count: int,
     priors: Priors,
     refit: Callable[[Measurements], Fit],
 ) -> bool:
-    """Warn of frames that a body fits far better once an axis is flipped or two are exchanged;
-    return whether there was something to tell.
+    """Warn of frames without any usable measurement, or that a body fits far better once an axis is
+    flipped or two are exchanged; return whether there was something to tell.
 
     :param R_camera_root: (3, 3) of each frame, found from a cold start with the default priors.
-    :param cost: for each measured point.
+    :param cost: of `count` measured points.
     :param refit: fits a frame from a cold start with the same priors.
     """
+    if frames and not count:
+        warnings.warn(
+            "Nothing that was measured is usable, so that no pose is known; check that numbers are "
+            "not NaN, and confidences above 0.",
+            ScopeWarning,
+            stacklevel=4,
+        )
+        return True
+    cost /= max(1, count)
     is_person = priors.flow is not None  # any other body may lie as well as stand
     in_image = any(frame.keypoints2d is not None for frame in frames)
     in_space = any(_in_space(frame) for frame in frames)

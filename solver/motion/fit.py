@@ -181,7 +181,8 @@ def fit_motion(
                 np.asarray(view.R_camera_world) @ found.states[k].R_camera_root
                 for k, view in zip(chosen, seen, strict=True)
             ],
-            found.cost / max(1, found.measurements.sum()),
+            found.cost,
+            found.measurements.sum(),
             priors,
             lambda m: fit_tree(tree, m, None, priors, options),
         )

@@ -18,6 +18,7 @@ from ..options import Options, Priors
 from ..part import Array
 from ..state import State
 from ..tree import Tree
+from ..validation import far_apart, warn_of_distance, warn_of_units
 from .views import View
 
 # of a point's rays: smallest over largest eigenvalue, below which they are too nearly parallel
@@ -51,10 +52,11 @@ def first_view(views: Sequence[View], points: int) -> View:
     if len(views) < 2:
         return views[0] if views else View(Measurements())
     fullest = max(views, key=lambda view: _points_of(view, points))  # of equal ones the first
-    found = View(triangulated(views, points))
-    return (
-        found if _points_of(found, points) > _LEAST_SHARE * _points_of(fullest, points) else fullest
-    )
+    found = triangulated(views, points)
+    meet = np.asarray(found.points)
+    # of cameras that are not placed in metres, the points are none of a person
+    is_usable = len(meet) > _LEAST_SHARE * _points_of(fullest, points) and not far_apart(meet)
+    return View(Measurements(keypoints3d=found)) if is_usable else fullest
 
 
 def _points_of(view: View, points: int) -> int:
@@ -78,7 +80,7 @@ def _camera_of(view: View) -> Camera:
     )
 
 
-def triangulated(views: Sequence[View], points: int) -> Measurements:
+def triangulated(views: Sequence[View], points: int) -> Keypoints3D:
     """Return the points of the world that rays of several cameras or 3D keypoints fix, numbered as
     in measurements.
 
@@ -111,7 +113,7 @@ def triangulated(views: Sequence[View], points: int) -> Measurements:
         p = np.full((points, 3), np.nan)
         p[fixed] = np.linalg.solve(A[fixed], b[fixed][..., None])[..., 0]
     index = np.flatnonzero(fixed)
-    return Measurements(keypoints3d=Keypoints3D(index, p[index], np.ones(len(index))))
+    return Keypoints3D(index, p[index], np.ones(len(index)))
 
 
 def _add_rows(A: Array, b: Array, indices: Array, row: Array, value: Array, weight: Array) -> None:
@@ -123,19 +125,24 @@ def _add_rows(A: Array, b: Array, indices: Array, row: Array, value: Array, weig
 
 
 def warn_of_cameras(frames: Sequence[Sequence[View]], points: int) -> bool:
-    """Warn where the cameras' rays of one frame miss each other, with `ScopeWarning`; and of what
-    makes them meet: each camera's R_camera_world transposed, its place replaced by t_camera_world,
-    its whole pose inverted, its axes those of OpenGL, or its pixels mirrored or swapped.
+    """Warn of cameras that are not placed in metres, with `UnitsWarning`; or, with `ScopeWarning`,
+    of those whose rays of one frame miss each other, and of what makes them meet: each camera's
+    R_camera_world transposed, its place replaced by t_camera_world, its whole pose inverted, its
+    axes those of OpenGL, or its pixels mirrored or swapped.
 
     :param points: how many points the body has, joints included.
     :return: whether there was something to tell.
     """
+    places = [view.t_camera_world for views in frames for view in views]
+    if warn_of_distance(np.array(places).reshape(-1, 3), "t_camera_world of views lies"):
+        return True
     views = next((v for v in frames if len(v) > 1), None)
     if views is None or any(view.measurements.keypoints2d is None for view in views):
         return False
     given = _median_error(views, points)
     if not given > _LARGEST_ERROR:
-        return False
+        meet = np.asarray(triangulated(views, points).points)
+        return warn_of_units(meet, "Points where rays meet by R_camera_world and t_camera_world")
     others: dict[str, list[View]] = {}
     for view in views:
         for remedy, (R, t) in _other_poses(*_camera_of(view)).items():
@@ -183,8 +190,7 @@ def _median_error(views: Sequence[View], points: int) -> float:
     """Return the median distance of 2D keypoints from their triangulated points in normalized
     image coordinates; infinite where these are behind a camera, NaN where there are none.
     """
-    found = triangulated(views, points).keypoints3d
-    assert found is not None
+    found = triangulated(views, points)
     at = np.full((points, 3), np.nan)
     at[np.asarray(found.indices)] = found.points
     errors = []

@@ -29,13 +29,7 @@ from ..residuals.external import External
 from ..residuals.registry import RESIDUALS, empty_tables
 from ..rotations import nearest_rotation
 from ..tree import Tree
-from ..validation import (
-    as_finite,
-    check_list,
-    check_rotations,
-    check_type,
-    warn_of_distance,
-)
+from ..validation import as_finite, check_list, check_rotations, check_type
 
 
 @dataclass
@@ -220,8 +214,7 @@ def _views_of(frame: Any, name: str) -> Sequence[View]:
         check_type(view.measurements, Measurements, f"measurements of {name}[{k}]")
         R = as_array(view.R_camera_world, (3, 3), f"R_camera_world of {name}[{k}]")
         check_rotations(R[None], f"R_camera_world of {name}[{k}]")
-        t = as_finite(view.t_camera_world, (3,), f"t_camera_world of {name}[{k}]")
-        warn_of_distance(t[None], f"t_camera_world of {name}[{k}] lies")
+        as_finite(view.t_camera_world, (3,), f"t_camera_world of {name}[{k}]")
     return frame
 
 

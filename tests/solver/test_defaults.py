@@ -208,6 +208,7 @@ def space(values, confidence=1.0, intrinsics=None, sigma_m=None):
 IMAGE = POINTS[:, :2] / POINTS[:, 2:] * INTRINSICS[0, 0] + INTRINSICS[:2, 2]
 SENSOR = np.diag([0.035, 0.035, 1.0]) @ INTRINSICS
 SENSOR[:2, 2] = INTRINSICS[:2, 2]
+HALF = np.diag([0.5, 0.5, 1.0]) @ INTRINSICS
 CORNER = INTRINSICS.copy()
 CORNER[:2, 2] = 0.0
 UP = np.array([0.0, -1.0, 0.0])
@@ -246,6 +247,12 @@ def numbers_of_another_detector():
     assert image.keypoints2d is not None
     blazepose = replace(image.keypoints2d, indices=np.arange(17))
     solver.fit(body, replace(image, keypoints2d=blazepose))
+
+
+def nothing_usable(pixels=IMAGE, confidence=1.0, fit=solver.fit, frames=None):
+    """What a fit with the default priors and no start is given of frames without a measurement."""
+    seen = Measurements(INTRINSICS, Keypoints2D(np.arange(len(pixels)), pixels, confidence))
+    return lambda: fit(BODY, seen if frames is None else [seen] * frames)
 
 
 def with_pose(t):
@@ -351,6 +358,39 @@ MISTAKES = {
         ScopeWarning,
         r"are \(0, 0\) or \(-1, -1\), .* confidence of 0",
     ),
+    "intrinsics of half the image's size": (
+        pixels(IMAGE + [150.0, 0.0], HALF),
+        ScopeWarning,
+        r"beyond the image .* \(320, 180\); .* pixels of this size, unless the image is cropped",
+    ),
+    "pixels that are all NaN": (
+        nothing_usable(np.full((M, 2), np.nan)),
+        ScopeWarning,
+        "Nothing that was measured is usable",
+    ),
+    "confidences of -1": (
+        nothing_usable(confidence=np.full(M, -1.0)),
+        ScopeWarning,
+        "usable, .* confidences above 0",
+    ),
+    "no points": (
+        nothing_usable(np.zeros((0, 2))),
+        ScopeWarning,
+        "Nothing that was measured is usable",
+    ),
+    "a clip without a measurement": (
+        nothing_usable(confidence=0.0, fit=solver.fit_clip, frames=2),
+        ScopeWarning,
+        "Nothing that was measured is usable",
+    ),
+    "a motion without a measurement": (
+        nothing_usable(
+            confidence=0.0, fit=lambda *given: solver.fit_motion(*given, [0.0, 0.1]), frames=2
+        ),
+        ScopeWarning,
+        "Nothing that was measured is usable",
+    ),
+    "centimetres": (space(100.0 * POINTS), UnitsWarning, "divide centimetres by 100"),
     "millimetres of focal length": (pixels(IMAGE, SENSOR), UnitsWarning, "multiply millimetres"),
     "percentages": (pixels(IMAGE, confidence=np.full(M, 90.0)), ScopeWarning, "by 100"),
     "percentages in space": (space(POINTS, np.full(M, 90.0)), ScopeWarning, "by 100"),
@@ -389,6 +429,12 @@ RIGHT = {
     ),
     "a floor of other axes, without a camera": on_floor(-UP, LOWEST, POINTS * [1.0, -1.0, -1.0]),
     "a pelvis at the origin": space(POINTS - POINTS[0]),
+    "a person who leaves the image at its lower edge": pixels(
+        IMAGE + [0.0, 2.0 * INTRINSICS[1, 2] - np.median(IMAGE[:, 1])]
+    ),
+    "a frame of a motion without a measurement": lambda: solver.fit_motion(
+        BODY, [SEEN, Measurements()], [0.0, 0.1]
+    ),
     "cameras of a stadium": with_pose([0.0, 0.0, 120.0]),
     "two turns": lambda: rotations.exp([0.0, 4.0 * np.pi, 0.0]),
 }

@@ -11,6 +11,7 @@ from scope.solver import (
     Measurements,
     Options,
     Priors,
+    ScopeWarning,
     ShapeError,
     Stage,
     State,
@@ -141,7 +142,8 @@ def test_frames_share_the_shape_and_those_left_out_are_fitted_to_it():
 
 def test_a_clip_without_measurements_ends_well():
     body, *_ = clip(9, frames=1)
-    empty = fit_clip(body, [Measurements(), Measurements()], focal=True)
+    with pytest.warns(ScopeWarning, match="Nothing that was measured is usable"):
+        empty = fit_clip(body, [Measurements(), Measurements()], focal=True)
     assert empty.status is Status.NO_MEASUREMENTS
     assert empty.focal_scale == 1.0
     np.testing.assert_array_equal(empty.beta, np.zeros(P))

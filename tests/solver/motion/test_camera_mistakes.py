@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scope import solver
 from scope.benchmarks.solver.cold_starts import CAMERA, random_person
-from scope.solver import Keypoints2D, Measurements, ScopeWarning, View, rotations
+from scope.solver import Keypoints2D, Measurements, ScopeWarning, UnitsWarning, View, rotations
 
 WIDTH = 2.0 * CAMERA[0, 2]
 OPENGL = np.diag([1.0, -1.0, -1.0])
@@ -76,6 +76,26 @@ def test_of_wrong_cameras_nothing_else_is_told():
         solver.fit_motion(people()[0], [views_around(**TRANSPOSED)], [0.0])
     assert len(told) == 1
     assert "transpose R_camera_world" in str(told[0].message)
+
+
+@pytest.mark.parametrize("scale", [100.0, 1000.0])
+def test_cameras_placed_in_centimetres_or_millimetres_are_told_once(scale):
+    """And nothing of 3D keypoints, which were not given; however many frames and cameras."""
+    views = [views_around(lambda R, t: (R, scale * t))] * 3
+    with pytest.warns(UnitsWarning) as told:
+        solver.fit_motion(people()[0], views, [0.0, 0.1, 0.2])
+    assert len(told) == 1
+    assert "t_camera_world" in str(told[0].message)
+    assert "centimetres by 100, millimetres by 1000" in str(told[0].message)
+
+
+def test_two_cameras_whose_poses_are_inverted_see_a_mirrored_person():
+    """Where both look level at the person from as far away, their rays meet all the same."""
+    inverted = CHANGES["inverted"][0]["poses"]
+    views = views_around(lambda R, t: inverted(R, np.array([0.0, 0.0, 4.0]) - R @ [0, 0, 4.0]))
+    with pytest.warns(ScopeWarning, match=r"in views, give R\^T and -R\^T t") as told:
+        solver.fit_motion(people()[0], [views[:2]], [0.0])
+    assert len(told) == 1
 
 
 def test_cameras_at_one_height_that_measure_from_below_see_a_mirrored_person():

@@ -40,7 +40,7 @@ def seen(world, camera, index, noise=0.0, confidence=1.0):
 
 
 def points_of(views):
-    return triangulated(views, POINTS).keypoints3d
+    return triangulated(views, POINTS)
 
 
 @pytest.fixture
