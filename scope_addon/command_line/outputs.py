@@ -406,10 +406,13 @@ def _shown_file(footage: Path, args: Namespace) -> Path:
 
 
 def summary(report: dict[str, Any]) -> str:
-    """Describe a capture in one line."""
+    """Describe a capture in one line. Distances are as wrong as an assumed lens is."""
+    lens = report["camera"]
+    if lens.startswith("assumed"):
+        lens += " (give a known lens by --fov or --focal-mm)"
     people = counted(report["people"], "person", "people")
     return (
         f"{people}, {counted(report['frames'], 'frame')}, {report['fps']['total']:.1f} frames/s, "
         f"reprojection error {report['reprojection_px']:.1f} px, networks on "
-        f"{report['execution']}; wrote {', '.join(report['outputs'])}"
+        f"{report['execution']}; camera: {lens}; wrote {', '.join(report['outputs'])}"
     )
