@@ -210,6 +210,8 @@ SENTENCES = {
     "mirrored_rig": "{file} holds '{rig}' mirrored by its negative scale, which Blender's "
     "importer, and perhaps others, show wrongly: apply the scale of the rig and its meshes (Ctrl "
     "A) before retargeting",
+    "outdated_rig": "'{rig}' has the motion that '{person}' had before it was changed: press "
+    "Retarget for the present one, and export again",
     "posed_bones": "the pose of these bones of '{rig}', which are not in the list, moves or turns "
     "the motion: {bones:names}; clear it in Pose Mode (Alt G, Alt R, Alt S) for the motion as "
     "captured",
@@ -232,6 +234,8 @@ SENTENCES = {
     "left out: {arrays:names}",
     "rate_not_stated": "the file states no frame rate; {rate:g} frames per second were assumed",
     "rate_stated": "the file states {stated:g} frames per second, which were used, not {given:g}",
+    "frames_without_poses": "the file has no poses {times:times}, for up to {longest_s:.1f} s: the "
+    "motion there is a guess",
     "no_translation": "the file holds no translation: the pelvis stays in place",
     "other_unit": "{file}: {array} is in {unit}, as only then the feet stand still on the floor, "
     "so it was converted to metres",

@@ -48,6 +48,7 @@ _UNITS = {100: "cm", 1000: "mm"}
 _LESS_SLIP = 0.1
 _LESS_SLIP_THAN_IN_PLACE = 0.7
 _FASTEST_M_S = 60.0  # of a person for half of a clip: a skydiver
+_GAP_S = 0.5  # between two poses, above which the motion between them is a guess
 _CAMERA_DISTANCE_M = 10.0  # in front of the nearest position; motion files need a camera
 
 
@@ -297,7 +298,12 @@ def convert(
     poses[:, 0] = log(R @ exp(poses[:, 0]))
     root = (J0 + trans) @ R.T
     frames = source.frames - (source.frames[0] if begin is None else begin)
-    contact, floor = _standing(body, betas, poses, root, frames / frames_per_second)
+    times = frames / frames_per_second
+    gaps_s = np.diff(times)
+    if (is_gap := gaps_s > _GAP_S).any():
+        begins = times[:-1][is_gap].tolist()
+        notes.append(notice("frames_without_poses", times=begins, longest_s=float(gaps_s.max())))
+    contact, floor = _standing(body, betas, poses, root, times)
     if not exact or axis != "z":
         root[:, 2] -= floor
     if axis != "z":

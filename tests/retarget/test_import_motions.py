@@ -244,6 +244,26 @@ def test_people_whom_a_tracker_saw_at_other_times_begin_then(tmp_path):
     np.testing.assert_allclose(second.timestamps, late / RATE)
 
 
+@pytest.mark.parametrize("missing", [7, 2 * int(RATE)])
+def test_seconds_in_which_a_tracker_saw_nobody_are_said_to_be_guessed(tmp_path, missing):
+    arrays = in_file("z")
+    count = len(arrays["poses"])
+    frames = np.arange(count)
+    frames[10:] += missing
+    np.savez(tmp_path / "gap.npz", **arrays, frame_ids=frames)
+    imported = import_motion(tmp_path / "gap.npz")
+    assert imported.motion.timestamps[10] - imported.motion.timestamps[9] == pytest.approx(
+        (missing + 1) / RATE
+    )
+    said = [note.values for note in imported.notes if note.code == "frames_without_poses"]
+    if missing == 7:
+        assert said == []  # half a second or less is between two poses that show the way
+    else:
+        ((begin,), longest) = said[0]["times"], said[0]["longest_s"]
+        assert begin == pytest.approx(9 / RATE)
+        assert longest == pytest.approx((missing + 1) / RATE)
+
+
 def test_another_rate_than_the_file_states_is_said_to_be_ignored(tmp_path):
     np.savez(tmp_path / "other.npz", **in_file("z"))
     (tmp_path / "own.npz").write_bytes(MOTION.to_bytes())
