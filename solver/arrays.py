@@ -91,7 +91,8 @@ def as_table(value: Any, ints: int, floats: int, name: str) -> tuple[Array, Arra
             f"Tables of {name!r} must be a pair of arrays (ints, floats), but got "
             f"{described(value)}."
         )
-    _refuse_unless_numbers(value[0], "iu", "integers", (None, ints), f"Whole numbers of {name!r}")
+    what = "integers, as of body.point(name) or body.joint_names.index(name),"
+    _refuse_unless_numbers(value[0], "iu", what, (None, ints), f"Whole numbers of {name!r}")
     _refuse_unless_numbers(value[1], "fiub", "numbers", (None, floats), f"Numbers of {name!r}")
     table = np.asarray(value[0], dtype=np.int64), np.asarray(value[1], dtype=np.float64)
     if (table[0].shape[1:], table[1].shape[1:]) != ((ints,), (floats,)) or len(table[0]) != len(

@@ -209,7 +209,7 @@ class Measurements:
             return np.zeros(0, np.int64), np.zeros((0, 3))
         indices = as_indices(m.indices, points, "Indices of 2D keypoints")
         n = len(indices)
-        pixels = as_array(m.pixels, (n, 2), "Pixels of 2D keypoints")
+        pixels = as_array(m.pixels, (n, 2), "Pixels of 2D keypoints, without confidence,")
         if self.intrinsics is None:
             raise ShapeError(
                 "2D keypoints need the camera's intrinsics, shape (3, 3), but got None."
@@ -242,7 +242,8 @@ class Measurements:
         if m is None:
             return np.zeros(0, np.int64), np.zeros((0, 4))
         indices = as_indices(m.indices, points, "Indices of 3D keypoints")
-        points_3d = as_array(m.points, (len(indices), 3), "Points of 3D keypoints")
+        name = "Points of 3D keypoints, without confidence,"
+        points_3d = as_array(m.points, (len(indices), 3), name)
         out = np.empty((len(indices), 4))
         out[:, :3] = points_3d
         out[:, 3] = as_confidence(m.confidence, len(indices), "3D keypoints")

@@ -169,7 +169,22 @@ MEASURED_REFUSED = {
     "floor's normal": (seen(floor=Floor([0], 2.0 * UP, 1.0, [1.0])), "normal of length 2"),
     "a table's indices": (
         seen(tables={"joint_limits": ([[0.7]], np.ones((1, 6)))}),
-        r"Whole numbers of 'joint_limits' must be integers of shape \(n, 1\), but got float64",
+        r"Whole numbers of 'joint_limits' must be integers.* of shape \(n, 1\), but got float64",
+    ),
+    "a table's names": (
+        seen(tables={"joint_limits": ([["left_hand"]], np.ones((1, 6)))}),
+        r"integers, as of body.point\(name\) or body.joint_names.index\(name\), of shape",
+    ),
+    "confidence beside pixels": (
+        seen(
+            intrinsics=INTRINSICS,
+            keypoints2d=Keypoints2D(range(M), np.column_stack([project(POINTS), np.ones(M)])),
+        ),
+        r"Pixels .* without confidence, must have shape \(12, 2\), but got shape \(12, 3\)",
+    ),
+    "confidence beside points": (
+        seen(keypoints3d=Keypoints3D(range(M), np.column_stack([POINTS, np.ones(M)]))),
+        r"Points .* without confidence, must have shape \(12, 3\), but got shape \(12, 4\)",
     ),
     "a table's numbers": (
         seen(tables={"joint_limits": ([[1]], [["a"] * 6])}),
