@@ -14,12 +14,15 @@ from mathutils import Matrix
 from ..arrays import Float64Array
 from ..kinematics.smoothing import continuous_quaternions
 from ..retarget.rest_pose import BoneMotion, Skeleton
-from .actions import Channels, bone_path, fcurves_of, nla_fcurves, read_keys
+from .actions import Channels, bone_path, fcurves, fcurves_of, nla_fcurves, read_keys
+from .character.root_object import root_object
 from .stored_values import KEYS_OF, source_of
 from .timing import Retiming, retime_keys
 
 # custom property of an action: the checksum of its keys when they were written
 _CHECKSUM = "scope_keys"
+# the same: that of the captured armature's values, of which they were made
+_SOURCE_CHECKSUM = "scope_source_keys"
 # channels of a bone beside its rotation, and their values at rest
 _OFFSETS = {"location": 0.0, "scale": 1.0}
 
@@ -82,6 +85,29 @@ def mark_written(action: Action, source: str = "") -> None:
     action[_CHECKSUM] = _checksum(action)
     if source:
         action[KEYS_OF] = source
+
+
+def remember_motion(action: Action, source: Object) -> None:
+    """Remember the motion that a captured armature has, to tell later whether it was corrected."""
+    action[_SOURCE_CHECKSUM] = _checksum_of_motion(source)
+
+
+def is_outdated(action: Action, source: Object) -> bool:
+    """Return whether a captured armature moves otherwise than when retargeting wrote the action."""
+    known = action.get(_SOURCE_CHECKSUM)
+    return known is not None and known != _checksum_of_motion(source)
+
+
+def _checksum_of_motion(source: Object) -> str:
+    """Return a checksum of the values of an armature's keys and its root object's, whose times
+    another frame rate changes.
+    """
+    found = hashlib.sha256()
+    curves = [curve for obj in (source, root_object(source)) if obj for curve in fcurves(obj)]
+    for curve in sorted(curves, key=lambda curve: (curve.data_path, curve.array_index)):
+        found.update(f"{curve.data_path}[{curve.array_index}]".encode())
+        found.update(read_keys(curve)[:, 1].tobytes())
+    return found.hexdigest()
 
 
 def follow_renaming(names: dict[str, str]) -> None:

@@ -45,6 +45,7 @@ from .rig_action import (
     clear_offsets,
     leave_tweak_mode,
     mark_written,
+    remember_motion,
     replace_action,
     root_locations,
     write_action,
@@ -251,6 +252,7 @@ def retarget(
         warnings += stretched_time_notices(bpy.context.scene)
         former = action_of(rig)
         action = write_action(rig, keys, frames, source.name)
+        remember_motion(action, source)
         if face is not None:
             key_face(rig, face, source.name)
         _set_parent(rig, frames, motion)

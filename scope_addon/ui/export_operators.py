@@ -19,9 +19,9 @@ from bpy.types import Collection, Context, Event, Object, Scene
 from ..errors import UsageError
 from ..options import Place
 from ..output_paths import SUFFIXES, check_output, files_of_people, left_over, person_paths
-from ..scene.datablocks import captures_of, holds
+from ..scene.datablocks import action_of, captures_of, holds
 from ..temporary import hold, release
-from .captured_person import body_of, motion_of, stored_person
+from .captured_person import body_of, motion_of, retargeted_from, stored_person
 from .captures import people_of, shown_capture
 from .comparison import cameras_of
 from .declared_properties import split, with_options
@@ -252,6 +252,8 @@ class SCOPE_OT_export(SavingOperator):
 
         :raises UsageError: no rig is chosen, or the format has none.
         """
+        from ..notices import notice
+        from ..scene.rig_action import is_outdated
         from ..scene.rig_file import export_rig
 
         rig = scene.scope_retarget.rig
@@ -265,7 +267,12 @@ class SCOPE_OT_export(SavingOperator):
                 "no rig is chosen under Retarget; choose a rig there and press Retarget first"
             )
         take = _take_of(rig, captures_of(scene))
-        return export_rig(path, rig, replace(options, take=take))
+        written = export_rig(path, rig, replace(options, take=take))
+        person = retargeted_from(scene, rig)
+        action = action_of(rig)
+        if person is not None and action is not None and is_outdated(action, person):
+            options.warn(notice("outdated_rig", rig=rig.name, person=person.name))
+        return written
 
 
 def write_captures(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.retarget import bone_map
 from scope.scope_addon.retarget.bone_map import PARTS
+from scope.scope_addon.scene.actions import fcurves
 from scope.scope_addon.scene.character.root_object import root_object
 from scope.scope_addon.scene.packed_motion import pack_motion
 from scope.scope_addon.scene.visibility import hide_again, show
@@ -346,6 +347,29 @@ def test_the_rig_is_exported_also_when_the_person_was_deleted(rig, tmp_path):
     path = tmp_path / "hero.bvh"
     assert bpy.ops.scope.export(filepath=str(path), format="BVH", which="RIG") == {"FINISHED"}
     assert path.is_file()
+
+
+def test_a_rig_whose_capture_was_changed_since_is_said_to_be_outdated(rig, tmp_path, capfd):
+    """Until it is retargeted again. Another frame rate moves the keys of both alike."""
+    source = person()
+
+    def exported():
+        capfd.readouterr()
+        bpy.ops.scope.export(filepath=str(tmp_path / "hero.bvh"), format="BVH", which="RIG")
+        return f"'{rig.name}' has the motion that '{source.name}' had before" in (
+            capfd.readouterr().out
+        )
+
+    bpy.ops.scope.retarget()
+    assert not exported()
+    bpy.context.scene.scope.result.footage_rate = 24.0
+    assert bpy.ops.scope.match_frame_rate() == {"FINISHED"}
+    assert not exported()
+    (curve, *_) = fcurves(source)
+    curve.keyframe_points[7].co.y += 0.1
+    assert exported()
+    bpy.ops.scope.retarget()
+    assert not exported()
 
 
 def test_exporting_without_a_rig_is_an_error_that_says_what_to_do(rig, tmp_path):
