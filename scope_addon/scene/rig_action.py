@@ -16,7 +16,7 @@ from ..kinematics.smoothing import continuous_quaternions
 from ..retarget.rest_pose import BoneMotion, Skeleton
 from .actions import Channels, bone_path, fcurves, fcurves_of, nla_fcurves, read_keys
 from .character.root_object import root_object
-from .stored_values import KEYS_OF, source_of
+from .stored_values import KEYS_OF, source_of, stored_text
 from .timing import Retiming, retime_keys
 
 # custom property of an action: the checksum of its keys when they were written
@@ -94,8 +94,8 @@ def remember_motion(action: Action, source: Object) -> None:
 
 def is_outdated(action: Action, source: Object) -> bool:
     """Return whether a captured armature moves otherwise than when retargeting wrote the action."""
-    known = action.get(_SOURCE_CHECKSUM)
-    return known is not None and known != _checksum_of_motion(source)
+    known = stored_text(action, _SOURCE_CHECKSUM)
+    return bool(known) and known != _checksum_of_motion(source)
 
 
 def _checksum_of_motion(source: Object) -> str:
