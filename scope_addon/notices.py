@@ -56,6 +56,9 @@ SENTENCES = {
     "repeated_frames": "{percent:.0f} % of the frames of {footage} repeat the one before, as after "
     "a conversion to a higher frame rate, so the motion is jerky; capture with --fps {rate:g} on "
     "the command line",
+    "frozen_frames": "{footage} shows one picture for up to {longest_s:.1f} s {times:times} and "
+    "then goes on, as where a recording stalls, so the person stands still there; capture the "
+    "parts before and after separately, with a start and end time",
     "frame_size_changes": "the frame size changes within {footage}; all frames were scaled to the "
     "first one's",
     "decoding_stopped": "decoding {footage} stopped after {decoded} of about {total} frames; the "

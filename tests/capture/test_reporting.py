@@ -16,6 +16,7 @@ from scope.scope_addon.capture.options import capture_options
 from scope.scope_addon.capture.reporting import (
     camera_warnings,
     face_frames,
+    freeze_warnings,
     repetition_warnings,
     unused_option_warnings,
     up_warnings,
@@ -254,6 +255,20 @@ def changes_of(shown, noise=1.0):
     return changes_between(pictures)
 
 
+def with_hand(lefts):
+    """Pictures of the room with a hand before it, from these columns on; its edges are six pixels
+    wide.
+    """
+    columns = np.arange(320)
+    noise = np.random.default_rng(2).normal(size=(7, *ROOM.shape))
+    pictures = ROOM + noise[np.arange(len(lefts)) % len(noise)]
+    for picture, left in zip(pictures, lefts, strict=True):
+        covers = np.clip(np.minimum(columns - left, left + 20 - columns) / 6 + 0.5, 0, 1)
+        hand = picture[80:110]
+        hand += covers[:, None] * ([200, 150, 120] - hand)
+    return pictures
+
+
 def changes_between(pictures):
     shown = [np.clip(picture, 0, 255).astype(np.uint8) for picture in pictures]
     cuts = SceneCuts(RATE)
@@ -287,6 +302,30 @@ def test_somebody_who_moves_stands_or_pauses_repeats_no_frames(shown):
     assert repetition_warnings("a.mp4", 30.0, changes_of(shown)) == []
 
 
+@pytest.mark.parametrize("fps", [24.0, 60.0])
+@pytest.mark.parametrize("still_s", [0.0, 0.1, 0.5, 2.0])
+def test_somebody_who_stops_and_goes_on_is_no_frozen_picture(fps, still_s):
+    """Within a sixth of a second, which is sudden."""
+    ramp = np.linspace(1.0, 0.0, round(fps / 6))
+    walk = np.ones(round(fps))
+    speeds = np.r_[walk, ramp, np.zeros(round(fps * still_s)), ramp[::-1], walk]
+    changes = changes_between(with_hand(60.0 + 40.0 * np.cumsum(speeds) / fps))
+    assert freeze_warnings("a.mp4", changes, np.arange(len(changes)) / fps) == []
+
+
+@pytest.mark.parametrize("goes_on", [60, 80])  # as it would have, or where it is by then
+@pytest.mark.parametrize("fps", [24.0, 60.0])
+def test_a_picture_that_freezes_amid_motion_is_said(fps, goes_on):
+    count = round(0.5 * fps)
+    changes = changes_of(np.r_[:60, [59] * count, goes_on : goes_on + 60])
+    times_s = 2.0 + np.arange(len(changes)) / fps
+    assert repetition_warnings("a.mp4", fps, changes) == []
+    (warning,) = freeze_warnings("a.mp4", changes, times_s)
+    assert warning.code == "frozen_frames"
+    assert warning.values["times"] == [pytest.approx(2.0 + 59 / fps)]
+    assert warning.values["longest_s"] == pytest.approx(0.5)
+
+
 @pytest.mark.parametrize(("fps", "hz"), [(30.0, 1.5), (30.0, 2.5), (60.0, 5.0)])
 @pytest.mark.parametrize("form", [np.sin, lambda turn: np.arcsin(np.sin(turn))])
 @pytest.mark.parametrize("reach", [10.0, 30.0])
@@ -294,16 +333,10 @@ def test_a_hand_that_waves_before_a_room_repeats_no_frames(fps, hz, form, reach)
     """Though it stands still for a moment at the end of each stroke, or turns back between two
     frames.
     """
-    columns = np.arange(320)
-    noise = np.random.default_rng(2).normal(size=(7, *ROOM.shape))
-    pictures = ROOM + noise[np.arange(120) % len(noise)]
-    for k, picture in enumerate(pictures):
-        left = 160 + reach * form(2 * np.pi * hz * (k + 0.5) / fps)
-        # Its edges are six pixels wide.
-        covers = np.clip(np.minimum(columns - left, left + 20 - columns) / 6 + 0.5, 0, 1)
-        hand = picture[80:110]
-        hand += covers[:, None] * ([200, 150, 120] - hand)
-    assert repetition_warnings("a.mp4", fps, changes_between(pictures)) == []
+    turns = 2 * np.pi * hz * (np.arange(120) + 0.5) / fps
+    changes = changes_between(with_hand(160 + reach * form(turns)))
+    assert repetition_warnings("a.mp4", fps, changes) == []
+    assert freeze_warnings("a.mp4", changes, np.arange(len(changes)) / fps) == []
 
 
 def test_what_compression_does_to_somebody_who_stands_repeats_no_frames():

@@ -30,7 +30,7 @@ from ..observe import Footage, Watch, observe
 from ..options import CaptureOptions, check_options
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..pipeline import Capture, repaired, shot_of
-from ..reporting import make_report, repetition_warnings, speed_warnings
+from ..reporting import freeze_warnings, make_report, repetition_warnings, speed_warnings
 from ..solve import progress_of_person, solve_people
 from ..tracking.track import Track
 from ..world.assemble import Shot
@@ -558,7 +558,10 @@ def _about_footage(
         changes = view.footage.picture_changes
         for warning in (
             *view.footage.warnings,
-            *repetition_warnings(name, float(view.video.fps), changes),
+            *(
+                repetition_warnings(name, float(view.video.fps), changes)
+                or freeze_warnings(name, changes, view.footage.timestamps)
+            ),
             *speed_warnings(view.video, options),
         ):
             is_said = warning in said or warning in warnings

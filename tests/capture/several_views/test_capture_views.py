@@ -104,18 +104,20 @@ def test_warnings_about_every_video_are_said_once():
     slower = notice("execution", text="slow")
     views = [
         SimpleNamespace(
-            footage=SimpleNamespace(warnings=warnings, picture_changes=np.array(changes)),
+            footage=SimpleNamespace(
+                warnings=warnings, picture_changes=np.array(changes), timestamps=np.arange(40) / 30
+            ),
             video=SimpleNamespace(path=f"{name}.mp4", recorded_speed=speed, fps=30),
         )
         for name, warnings, speed, changes in (
             ("b", [damaged, slower], 1.0, [0.0, 90.0] * 20),
-            ("c", [slower], 8.0, [90.0] * 40),
+            ("c", [slower], 8.0, [90.0] * 20 + [1.0] * 15 + [90.0] * 5),
         )
     ]
     found = several._about_footage(views, CaptureOptions(), [slower])
-    codes = ["decoding_stopped", "repeated_frames", "slow_motion"]
+    codes = ["decoding_stopped", "repeated_frames", "frozen_frames", "slow_motion"]
     assert [each.code for each in found] == codes
-    assert several._about_footage(views, CaptureOptions(speed=1.0), [slower]) == found[:2]
+    assert several._about_footage(views, CaptureOptions(speed=1.0), [slower]) == found[:3]
 
 
 def test_warnings_advise_only_what_several_cameras_can_have(videos, monkeypatch):
