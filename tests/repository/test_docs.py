@@ -394,6 +394,14 @@ def test_every_python_block_runs(code, body, folder, capsys):
         assert float(said[1]) == pytest.approx(float(error.split()[0]), abs=3.0)
 
 
+def test_researchers_are_told_the_recorded_figures_of_the_sample():
+    """What the page's own lines print of its capture, as the gate records it."""
+    record = json.loads((ROOT / "benchmarks" / "gate.json").read_text("utf-8"))
+    figures = (record[f"sample {key}"]["value"] for key in ("mpjpe_root", "pa_mpjpe"))
+    page = (ROOT / "docs" / "for_researchers.md").read_text("utf-8")
+    assert "prints {:.0f} / {:.0f} mm".format(*figures) in page
+
+
 @pytest.mark.parametrize("code", blocks("toml"))
 def test_every_toml_block_is_a_calibration_with_places(code, folder):
     (folder / "calib.toml").write_text(code + "\n" + code.replace("cam_1", "cam_2"))
