@@ -30,7 +30,7 @@ class BuildProduct(build_py):
 
 
 setup(
-    # Blender needs the version written out in the manifest, so it is stated there, and only there.
+    # Blender needs the version written out in the manifest; a test compares it with the citations.
     version=tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"],
     packages=["scope", *(f"scope.{name}" for name in find_packages(".", include=PRODUCT))],
     cmdclass={"build_py": BuildProduct},

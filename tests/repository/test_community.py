@@ -15,19 +15,21 @@ def load(path: Path):
     return package("yaml").safe_load(path.read_text("utf-8"))
 
 
-def test_the_citation_names_the_paper_and_states_no_version_of_its_own():
+def test_the_citation_names_the_paper_and_the_version():
     citation = load(ROOT / "CITATION.cff")
     assert {"cff-version", "message", "title", "authors"} <= set(citation)
-    assert "version" not in citation
+    version = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["version"]
+    assert citation["version"] == version
     paper = citation["preferred-citation"]
     assert len(paper["authors"]) == 6
     bibtex = (ROOT / "docs" / "for_researchers.md").read_text("utf-8")
+    assert f"version = {{{version}}}" in bibtex
     assert f"year = {{{paper['year']}}}" in bibtex
     assert paper["title"] in bibtex
     for author in paper["authors"]:
         assert f"{author['family-names']}, {author['given-names']}" in bibtex
     manifest = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
-    assert manifest["project"]["license"] .startswith(citation["license"] + " AND ")
+    assert manifest["project"]["license"].startswith(citation["license"] + " AND ")
 
 
 def test_every_source_states_its_licence():
