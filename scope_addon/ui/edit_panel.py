@@ -341,14 +341,15 @@ class SCOPE_OT_reduce_keys(EditOperator):
             armature, body, betas, rate, math.radians(self.degrees), self.millimetres / 1000.0
         )
         return rpt_(
-            "Reduced {before} key to {after}; maximum error {angle:.2f} degrees for bones, "
-            "{distance:.1f} mm for joints"
+            "Reduced {before} key to {after}; maximum error {angle:.2f} degrees for bones and "
+            "{pelvis:.1f} mm for the pelvis, which add up to {distance:.1f} mm for a joint"
             if found.before == 1
-            else "Reduced {before} keys to {after}; maximum error {angle:.2f} degrees for bones, "
-            "{distance:.1f} mm for joints",
+            else "Reduced {before} keys to {after}; maximum error {angle:.2f} degrees for bones "
+            "and {pelvis:.1f} mm for the pelvis, which add up to {distance:.1f} mm for a joint",
             before=found.before,
             after=found.after,
             angle=math.degrees(found.angle),
+            pelvis=1000 * found.pelvis_m,
             distance=1000 * found.joint_m,
         )
 

@@ -149,7 +149,8 @@ class Reduction:
     before: int
     after: int
     angle: float  # radians, of any bone relative to its parent
-    joint_m: float  # metres, of any joint in the armature's space
+    pelvis_m: float  # metres, of the pelvis in the armature's space
+    joint_m: float  # metres, of any joint there: where the errors of the bones above it add up
 
 
 def reduce_keys(
@@ -179,7 +180,8 @@ def reduce_keys(
     reduced = read_clip_at(armature, body, rate, frames)
     off = angles_between(channel_values(armature, body, reduced)[0], q)
     moved = np.linalg.norm(reduced.joints(body, betas) - clip.joints(body, betas), axis=-1)
-    return Reduction(before, after, float(off.max()), float(moved.max()))
+    pelvis_m, joint_m = float(moved[:, 0].max()), float(moved.max())
+    return Reduction(before, after, float(off.max()), pelvis_m, joint_m)
 
 
 def channel_curves(armature: Object, body: Body) -> list[FCurve]:
