@@ -27,7 +27,7 @@ from ..job.job_progress import BUILDING, JobProgress, kind_of, load_stage_times,
 from ..job.process import ROOT, START_SCRIPT, WorkerProcess
 from ..job.request import JobRequest, code_version
 from ..motion import Motion
-from ..notices import notice
+from ..notices import Notice, notice
 from ..options import Place
 from ..options.body_choice import chosen_body
 from ..options.capture import AUTO
@@ -250,13 +250,14 @@ def show_build(
     *,
     keeps_rate: bool,
     what: str = "footage",
-) -> None:
+) -> list[Notice]:
     """Show what was built in a scene, with what is to be known about it.
 
     :param footage: path of the video or picture; empty if there is none.
     :param report: of the capture.
     :param keeps_rate: whether the scene keeps its own frame rate.
     :param what: has the other rate: a key of ``notices.PHRASES``.
+    :return: what is to be known.
     """
     motion = result.people[0].motion
     warnings = list(report.warnings)
@@ -265,6 +266,7 @@ def show_build(
     report = replace(report, warnings=warnings + result.warnings)
     show_result(result.collection.scope_result, footage, report, result)
     scene.scope.capture = result.collection
+    return report.warnings
 
 
 def capture_request(scene: Scene) -> JobRequest:

@@ -25,6 +25,7 @@ from .reporting import ReportingOperator, iface_, rpt_, sentence
 from .view_operators import show_new_capture
 
 if TYPE_CHECKING:
+    from ..notices import Notice
     from ..retarget.import_motions import Imported
     from ..scene.build import BuildOptions
 
@@ -81,15 +82,16 @@ class SCOPE_OT_import_motion(ReportingOperator):
             for imported in import_motions(path, body, self.up_axis.lower(), self.motion_rate)
         ]
         before = captures_of(context.scene)
+        notes: list[Notice] = []
         with all_or_nothing(context.scene):
             for path, imported in found:
-                _build(context.scene, path, imported, self._build_options(context.scene))
+                notes += _build(context.scene, path, imported, self._build_options(context.scene))
         new = [each for each in captures_of(context.scene) if each not in before]
         hide_others(context.scene, new)
         show_new_capture(context, context.scene)
-        notes = list(dict.fromkeys(note for _, imported in found for note in imported.notes))
-        if notes:
-            self.report({"WARNING"}, sentence("; ".join(note.text(iface_) for note in notes)))
+        texts = dict.fromkeys(note.text(iface_) for note in notes)
+        if texts:
+            self.report({"WARNING"}, sentence("; ".join(texts)))
             return ""
         return rpt_("Imported {files}", files=", ".join(path.name for path in paths))
 
@@ -126,8 +128,8 @@ class SCOPE_OT_import_motion(ReportingOperator):
         return replace(options, frame_rate="set" if self.set_rate else rate)
 
 
-def _build(scene: Scene, path: Path, imported: Imported, options: BuildOptions) -> None:
-    """Build one motion and store it and its result with the scene"""
+def _build(scene: Scene, path: Path, imported: Imported, options: BuildOptions) -> list[Notice]:
+    """Build one motion, store it and its result with the scene, and return what is to be known."""
     from ..scene.build import build_scene
     from ..scene.packed_motion import pack_motion
     from .capture_job import show_build
@@ -150,7 +152,7 @@ def _build(scene: Scene, path: Path, imported: Imported, options: BuildOptions) 
     )
     result = build_scene([motion], imported.body, footage, options)
     pack_motion(result.people[0].armature, motion.to_bytes())
-    show_build(
+    return show_build(
         scene,
         result,
         str(footage or ""),

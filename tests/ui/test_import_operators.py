@@ -34,7 +34,7 @@ def amass(tmp_path):
     return path
 
 
-def test_a_motion_of_another_tool_is_built_and_listed(amass):
+def test_a_motion_of_another_tool_is_built_and_listed(amass, capfd):
     scene = bpy.context.scene
     scene.render.fps = 24
     scene.scope.start_frame = 1
@@ -43,6 +43,8 @@ def test_a_motion_of_another_tool_is_built_and_listed(amass):
     assert (result.collection.name, result.people, result.frames) == ("walk_poses", 1, len(MOTION))
     assert "Scope's own body" in result.warnings[0].text
     assert "keeps its 24 frames/s, the motion has 120" in result.warnings[1].text
+    said = capfd.readouterr().out  # The status bar shows it too.
+    assert all(warning.text[1:] in said for warning in result.warnings[:2])
     button = bpy.ops.scope.match_frame_rate.get_rna_type().name
     assert button in result.warnings[1].text
     assert "footage" not in result.warnings[1].text.lower()  # there is none
