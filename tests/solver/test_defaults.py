@@ -385,7 +385,9 @@ MISTAKES = {
     ),
     "a motion without a measurement": (
         nothing_usable(
-            confidence=0.0, fit=lambda *given: solver.fit_motion(*given, [0.0, 0.1]), frames=2
+            confidence=0.0,
+            fit=lambda body, seen: solver.fit_motion(body, seen, [0.0, 0.1]),
+            frames=2,
         ),
         ScopeWarning,
         "Nothing that was measured is usable",
