@@ -250,7 +250,7 @@ def show_build(
     *,
     keeps_rate: bool,
     what: str = "footage",
-) -> list[Notice]:
+) -> Sequence[Notice]:
     """Show what was built in a scene, with what is to be known about it.
 
     :param footage: path of the video or picture; empty if there is none.

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -128,7 +129,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
         return replace(options, frame_rate="set" if self.set_rate else rate)
 
 
-def _build(scene: Scene, path: Path, imported: Imported, options: BuildOptions) -> list[Notice]:
+def _build(scene: Scene, path: Path, imported: Imported, options: BuildOptions) -> Sequence[Notice]:
     """Build one motion, store it and its result with the scene, and return what is to be known."""
     from ..scene.build import build_scene
     from ..scene.packed_motion import pack_motion
