@@ -46,6 +46,8 @@ _ALIKE = 0.03
 _SLIGHT = 0.01  # The weight of a bone without a mirror image.
 # Wings are behind arms by more than this share of the rig's size.
 _BEHIND = 0.02
+# The bones before toes lead forward by more than this multiple of their fall; shins do not.
+_LEVEL = 0.5
 # What is no lower than this share of the highest bone in the middle belongs to the head.
 _HIGH = 0.9
 # The tip of a head is above it by more than this multiple of the neck's bones.
@@ -566,13 +568,17 @@ def _person(rest: RestPose, ends: Mapping[str, list[int]]) -> int:
 
 def _before_wings(rest: RestPose, ends: Mapping[str, list[int]], side: str) -> list[int]:
     """Return the ends of the arm on a side without those of wings: of several limbs, of three bones
-    and more, that one bone carries, arms are where the toes point.
+    and more, that one bone carries, arms are where the toes point. Without toes, nothing tells.
 
     :param ends: the bones at which each limb may end.
     """
     toes = [*ends["left leg"], *ends["right leg"]]
-    forward = (rest.heads[toes] - rest.heads[rest.parents[toes]]).sum(axis=0) * [1.0, 1.0, 0.0]
-    forward /= max(float(np.linalg.norm(forward)), 1e-9)
+    ways = (rest.heads[toes] - rest.heads[rest.parents[toes]]).sum(axis=0)
+    forward = ways * [1.0, 1.0, 0.0]
+    length = float(np.linalg.norm(forward))
+    if length <= _LEVEL * abs(ways[2]):
+        return ends[f"{side} arm"]
+    forward /= length
     across = {above for hand in ends[f"{OTHER_SIDE[side]} arm"] for above in rest.chains[hand]}
     limbs: dict[int, list[int]] = {}
     for hand in ends[f"{side} arm"]:
