@@ -93,9 +93,12 @@ def remember_motion(action: Action, source: Object) -> None:
 
 
 def is_outdated(action: Action, source: Object) -> bool:
-    """Return whether a captured armature moves otherwise than when retargeting wrote the action."""
+    """Return whether a captured armature moves otherwise than when retargeting wrote its motion to
+    the action; False if that has the motion of another one.
+    """
     known = stored_text(action, _SOURCE_CHECKSUM)
-    return bool(known) and known != _checksum_of_motion(source)
+    is_own = bool(known) and source_of(action) == source.name
+    return is_own and known != _checksum_of_motion(source)
 
 
 def _checksum_of_motion(source: Object) -> str:

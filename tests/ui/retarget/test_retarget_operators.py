@@ -372,6 +372,18 @@ def test_a_rig_whose_capture_was_changed_since_is_said_to_be_outdated(rig, tmp_p
     assert not exported()
 
 
+def test_the_motion_of_a_former_capture_is_not_called_outdated(rig, tmp_path, capfd):
+    bpy.ops.scope.retarget()
+    former = rig.animation_data.action
+    bpy.context.view_layer.objects.active = captured(motion_of(walk(1.0)))
+    bpy.ops.scope.retarget()
+    assert rig.animation_data.action != former
+    rig.animation_data.action = former
+    capfd.readouterr()
+    bpy.ops.scope.export(filepath=str(tmp_path / "hero.bvh"), format="BVH", which="RIG")
+    assert "before it was changed" not in capfd.readouterr().out
+
+
 def test_exporting_without_a_rig_is_an_error_that_says_what_to_do(rig, tmp_path):
     bpy.context.scene.scope_retarget.rig = None
     with pytest.raises(RuntimeError, match="choose a rig there"):
