@@ -161,7 +161,8 @@ def test_wings_are_no_arms(drop: float, turn: float, rise: float, reach: float) 
     """Spread or folded, on the back of a person that is turned."""
     bones, part_of = bones_of("nameless", drop=drop)
     winged = with_wings(bones, rise, reach)
-    turned = winged.heads @ exp(np.array([0.0, 0.0, turn])).T
+    R_turned_rest = np.asarray(exp(np.array([0.0, 0.0, turn])), float)
+    turned = winged.heads @ R_turned_rest.T
     assert guess(RestPose(winged.names, winged.parents, turned)).parts == part_of
 
 
