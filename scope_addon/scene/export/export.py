@@ -174,6 +174,7 @@ def _write_one(
                 f"no bone of '{rig.name}' deforms anything, so none would be left; switch Only "
                 "Deform Bones off, on the command line leave out --deform-bones"
             )
+        written = [each for each in rigs if each in scene.objects.values()]
         if suffix != ".blend":  # which has keys alone
             check_samples(scene, rigs)
         writers = {
@@ -192,7 +193,7 @@ def _write_one(
         _write(path, writers[suffix])
     for each in notices:
         options.warn(each)
-    for armature in rigs if suffix in (".glb", ".fbx", ".usdc") else ():
+    for armature in written if suffix in (".glb", ".fbx", ".usdc") else ():
         bones = [b.name for b in armature.data.bones if b.use_deform and b.bbone_segments > 1]
         if bones:
             options.warn(notice("bends_left_out", file=path.name, rig=armature.name, bones=bones))

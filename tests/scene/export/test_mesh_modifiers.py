@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.scene.actions import Channels
 from scope.scope_addon.scene.export.export import ExportOptions
+from scope.scope_addon.scene.export.export import export as write
 from scope.scope_addon.scene.rig_file import export_rig
 
 from ..exported import read_back
@@ -98,6 +99,22 @@ def test_bones_that_bend_are_said(tmp_path):
     bone.bbone_segments = 4
     bone.use_deform = False
     assert export(tmp_path / "rig.fbx", rig) == []
+
+
+def test_of_separate_files_each_is_said_to_lack_the_bends_of_its_own_rig(tmp_path):
+    collection = bpy.data.collections.new("people")
+    bpy.context.scene.collection.children.link(collection)
+    rigs = []
+    for _ in range(2):
+        rig, skin = half_a_face()
+        rig.data.bones[skin.vertex_groups[0].name].bbone_segments = 4
+        collection.objects.link(rig)
+        rigs.append(rig)
+    said = []
+    options = ExportOptions(separate=True, warn=said.append)
+    written = write(tmp_path / "rig.fbx", [collection], options=options)
+    of = [(note.values["file"], note.values["rig"]) for note in said]
+    assert of == [(path.name, rig.name) for path, rig in zip(written, rigs, strict=True)]
 
 
 def test_a_mirrored_rig_is_said_of_the_format_that_blender_shows_wrongly(tmp_path):
