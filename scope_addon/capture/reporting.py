@@ -48,6 +48,7 @@ FEWEST_STEPS = 20
 # Least time in which a picture that does not change between two in which something moves is frozen.
 # In 27 clips without such, changes beside as long a rest are at most 9.
 FROZEN_S = 0.2
+SLOWEST_STEP_S = 0.05  # from frame to frame; with longer ones, people stop from one to the next
 REPEATS_OFF = 0.15  # error of the mean number of frames that show one moment
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen
 
@@ -252,7 +253,7 @@ def freeze_warnings(name: str, changes: Float64Array, times_s: Float64Array) -> 
         if stops_and_goes_on > MOVING_CHANGE and length_s >= FROZEN_S:
             begins_s.append(float(times_s[first - 1]))
             longest_s = max(longest_s, length_s)
-    if not begins_s:
+    if not begins_s or np.median(np.diff(times_s)) > SLOWEST_STEP_S:
         return []
     return [notice("frozen_frames", footage=name, times=begins_s, longest_s=longest_s)]
 

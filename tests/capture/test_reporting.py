@@ -302,7 +302,7 @@ def test_somebody_who_moves_stands_or_pauses_repeats_no_frames(shown):
     assert repetition_warnings("a.mp4", 30.0, changes_of(shown)) == []
 
 
-@pytest.mark.parametrize("fps", [24.0, 60.0])
+@pytest.mark.parametrize("fps", [5.0, 10.0, 15.0, 24.0, 60.0])
 @pytest.mark.parametrize("still_s", [0.0, 0.1, 0.5, 2.0])
 def test_somebody_who_stops_and_goes_on_is_no_frozen_picture(fps, still_s):
     """Within a sixth of a second, which is sudden."""
