@@ -177,7 +177,7 @@ class ClipFit:
     """
 
     frames: list[Fit] = field(repr=False)
-    beta: Array
+    beta: Array = field(repr=False)
     beta_information: Array = field(repr=False)
     focal_scale: float
     status: Status

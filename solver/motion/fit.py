@@ -68,7 +68,7 @@ class MotionFit:
     states: list[State] = field(repr=False)
     R_world_part: Array = field(repr=False)
     t_world_part: Array = field(repr=False)
-    beta: Array
+    beta: Array = field(repr=False)
     beta_information: Array = field(repr=False)
     focal_scale: float
     measurements: Array = field(repr=False)

@@ -82,6 +82,7 @@ def test_a_printed_result_is_one_short_line():
         printed = str(result)
         assert "\n" not in printed
         assert len(printed) < 300
+        assert "array" not in printed  # that of a shape of ten parameters has two lines
         assert "CONVERGED" in printed
         assert f"cost={result.cost}" in printed
         assert "rejected" not in printed  # which reads as rejected measurements
