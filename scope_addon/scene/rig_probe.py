@@ -22,7 +22,7 @@ from ...solver.errors import InputError
 from ...solver.rotations import log
 from ..arrays import BoolArray, Float64Array, IndexArray
 from ..kinematics.axes import transform_points, transposed, unscaled
-from ..notices import Notice, notice
+from ..notices import MAX_NAMES, Notice, notice
 from ..retarget.bone_map import PHALANGES, check_bone_count
 from ..retarget.fingers import bone_ends
 from ..retarget.rest_pose import BoneMotion, RestPose, Skeleton
@@ -60,6 +60,8 @@ _TURNING = (
     *("TRACK_TO", "TRANSFORM", *_CHAINED),
 )
 _UNKNOWN = "the constraint or driver that controls the bone"
+# That are named in a message: those of four limbs, and of what their ends turn by.
+_MAX_CONSTRAINTS = 12
 # Of the lowest bone from the rig's origin, as a share of the rig's size.
 _MAX_LIFT = 0.17
 
@@ -137,7 +139,13 @@ def _controlling(rig: Object, names: Iterable[str]) -> str:
         if wanted.intersection(chain)
     ]
     several = "s" if len(found) > 1 else ""
-    return f"the constraint{several} {' and '.join(found)}" if found else ""
+    return f"the constraint{several} {_listed(found, ' and ', _MAX_CONSTRAINTS)}" if found else ""
+
+
+def _listed(texts: list[str], between: str, most: int) -> str:
+    """Return texts in a row; of many, the first few and the number of the others."""
+    more = len(texts) - most
+    return between.join(texts[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def _check_carried(
@@ -283,12 +291,13 @@ def _refuse_blocked(rig: Object, blocked: list[str], names: list[str]) -> None:
     :param names: of all mapped bones; constraints may turn more of them than those that stay still.
     :raises InputError: always.
     """
-    bones = ", ".join(f"'{name}'" for name in blocked)
+    bones = _listed([f"'{name}'" for name in blocked], ", ", MAX_NAMES)
     held = held_bones(rig).intersection(names)
     one = len(blocked) == 1
+    unknown = _UNKNOWN if one else "the constraints or drivers that control them"
     raise InputError(
         f"{bones} of '{rig.name}' {'does' if one else 'do'} not move when rotated: mute "
-        f"{_controlling(rig, held.union(blocked)) or _UNKNOWN}, or remove "
+        f"{_controlling(rig, held.union(blocked)) or unknown}, or remove "
         f"{'the bone' if one else 'these bones'} from the list"
     )
 

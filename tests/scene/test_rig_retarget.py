@@ -376,6 +376,20 @@ def test_all_constraints_that_hold_legs_are_named_at_once(source):
         run(source, rig)
 
 
+def test_of_a_rig_that_follows_another_a_few_of_its_constraints_are_named(source):
+    rig, bone_of = build_rig("unreal")
+    target = rig.copy()
+    bpy.context.scene.collection.objects.link(target)
+    for bone in rig.pose.bones:
+        constraint = bone.constraints.new("COPY_TRANSFORMS")
+        constraint.target, constraint.subtarget = target, bone.name
+    bone_map = BoneMap({bone: part for part, bone in bone_of.items()})
+    with pytest.raises(InputError, match=f"and {len(bone_of) - 6} more of 'unreal' do not") as said:
+        run(source, rig, bone_map=bone_map)
+    assert f"and {len(bone_of) - 12} more, or remove these bones" in str(said.value)
+    assert len(str(said.value)) < 700
+
+
 def test_the_bone_that_carries_hips_and_spine_is_proposed_for_the_pelvis(source):
     rig, bone_of = build_rig("unreal")
     bpy.context.view_layer.objects.active = rig
