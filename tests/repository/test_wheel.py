@@ -216,6 +216,13 @@ def test_the_wheel_states_the_licences_of_all_that_it_contains(wheel):
     }
 
 
+def test_every_pattern_of_licences_finds_some_where_no_networks_were_built():
+    """setuptools warns of one that finds none, and will refuse it."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    for pattern in project["license-files"]:
+        assert [path for path in ROOT.glob(pattern) if path.parent.name != "networks"], pattern
+
+
 @pytest.mark.parametrize("python", ["3.11", "3.13"])
 def test_a_capture_installs_versions_that_were_tested_and_none_that_fail(python):
     """OpenCV 4.14 and 5 lack `setLogLevel`, onnxruntime from 1.29 on reports to its makers."""
