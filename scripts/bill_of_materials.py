@@ -126,7 +126,7 @@ def libraries(package: str, files: Iterable[tuple[str, bytes]]) -> list[Library]
     made = []
     for project, own, number, file, digest in found:
         version = own or stated.get(project, "")  # of all files of a project, one may state it
-        licence = _licence(project, version, projects)
+        licence = _licence(project, version or number, projects)
         made.append(Library(project, version, number, licence, file, digest))
     return sorted(made, key=lambda library: (library.project.lower(), library.file))
 

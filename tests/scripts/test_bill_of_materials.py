@@ -195,6 +195,12 @@ def test_a_number_in_a_files_name_is_no_version(bills):
     }
 
 
+def test_a_licence_of_old_versions_is_found_by_a_files_number_where_it_states_no_version(bills):
+    (library,) = bills.libraries("made", [("made.libs/libcrypto-0a1b2c3d.so.1.1", b"")])
+    assert (library.version, library.licence) == ("", "OpenSSL")
+    assert bills.conflicts([library])
+
+
 def test_every_listed_library_is_documented(bills):
     text = (ROOT / "THIRD_PARTY.md").read_text("utf-8")
     for project in bills.PROJECTS:
