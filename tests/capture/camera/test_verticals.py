@@ -6,9 +6,10 @@ known up.
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.camera.intrinsics import Camera, choose_camera, pinhole
+from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.camera.line_segments import Lines, Segments, find_segments
 from scope.scope_addon.capture.camera.verticals import estimate_up_from_lines
+from scope.scope_addon.capture.fitting.focal_length import camera_by_edges
 from scope.scope_addon.capture.world.world_frame import BODIES, up_from_scene
 from scope.solver.rotations import exp
 
@@ -135,7 +136,8 @@ def test_real_cameras_with_roll_and_pitch(shared, number):
     ok, picture = cv2.VideoCapture(str(folder / f"cam{number}.mp4")).read()
     assert ok
     truth = np.load(folder / f"truth_cam{number}.npz")["up"]
-    camera = choose_camera(picture.shape[1], picture.shape[0])  # the focal length is unknown
-    lines = find_segments(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), []).lines(camera)
+    size = (picture.shape[1], picture.shape[0])
+    segments = find_segments(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), [])
+    lines = segments.lines(camera_by_edges(segments, *size, size))  # the focal length is unknown
     leaning = exp(np.radians(7) * np.random.default_rng(number).standard_normal(3)) @ truth
     assert angle_deg(estimate_up_from_lines(lines, leaning).up, truth) < 2.0
