@@ -46,7 +46,8 @@ _ALIKE = 0.03
 _SLIGHT = 0.01  # The weight of a bone without a mirror image.
 # Wings are behind arms by more than this share of the rig's size.
 _BEHIND = 0.02
-# The bones before toes lead forward by more than this multiple of their fall; shins do not.
+# Toes lie ahead of ankles by more than this multiple of how far they lie below; ankles do not lie
+# so far ahead of knees.
 _LEVEL = 0.5
 # What is no lower than this share of the highest bone in the middle belongs to the head.
 _HIGH = 0.9
@@ -573,10 +574,11 @@ def _before_wings(rest: RestPose, ends: Mapping[str, list[int]], side: str) -> l
     :param ends: the bones at which each limb may end.
     """
     toes = [*ends["left leg"], *ends["right leg"]]
-    ways = (rest.heads[toes] - rest.heads[rest.parents[toes]]).sum(axis=0)
-    forward = ways * [1.0, 1.0, 0.0]
+    ways = rest.heads[toes] - rest.heads[rest.parents[toes]]
+    lengths = np.linalg.norm(ways[:, :2], axis=1)
+    forward = ways[lengths > _LEVEL * abs(ways[:, 2])].sum(axis=0) * [1.0, 1.0, 0.0]
     length = float(np.linalg.norm(forward))
-    if length <= _LEVEL * abs(ways[2]):
+    if length < 1e-9:
         return ends[f"{side} arm"]
     forward /= length
     across = {above for hand in ends[f"{OTHER_SIDE[side]} arm"] for above in rest.chains[hand]}
