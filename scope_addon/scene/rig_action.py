@@ -101,6 +101,18 @@ def is_outdated(action: Action, source: Object) -> bool:
     return is_own and known != _checksum_of_motion(source)
 
 
+def up_to_date(source: Object) -> list[Action]:
+    """Return the actions that have a captured armature's present motion."""
+    return [
+        action
+        for action in bpy.data.actions
+        if action.library is None
+        and _SOURCE_CHECKSUM in action
+        and source_of(action) == source.name
+        and not is_outdated(action, source)
+    ]
+
+
 def _checksum_of_motion(source: Object) -> str:
     """Return a checksum of the values of an armature's keys and its root object's, whose times
     another frame rate changes.

@@ -47,6 +47,7 @@ from .translations import CONTEXT
 
 if TYPE_CHECKING:
     from ...solver.body import Body
+    from ..arrays import Float64Array
     from ..edit.clip import Clip
     from ..edit.corrections import Correction
     from ..motion import Motion
@@ -203,18 +204,32 @@ class SCOPE_OT_root_motion(EditOperator):
     )
 
     def edit(self, context: Context, armature: Object, body: Body, rate: float) -> str:
-        """Change all keys."""
+        """Change all keys. A rig that has the motion still has it where it looks the same."""
+        import numpy as np
+
+        from ..scene.character.keys import read_clip
         from ..scene.character.root_object import (
+            clip_as_displayed,
             move_root_motion_to_bones,
             move_root_motion_to_object,
         )
+        from ..scene.rig_action import remember_motion, up_to_date
 
+        def displayed() -> Float64Array:
+            clip = clip_as_displayed(armature, *read_clip(armature, body, rate))
+            return clip.joints(body, betas_of(armature, body))
+
+        retargeted = up_to_date(armature)
+        before = displayed() if retargeted else None
         if self.mode == "BONES":
             move_root_motion_to_bones(armature, body, rate)
         else:
             move_root_motion_to_object(
                 armature, body, rate, in_place=self.mode == "IN_PLACE", heading=self.heading
             )
+        if before is not None and np.allclose(displayed(), before, atol=0.001):
+            for action in retargeted:
+                remember_motion(action, armature)
         return ""
 
 

@@ -372,6 +372,16 @@ def test_a_rig_whose_capture_was_changed_since_is_said_to_be_outdated(rig, tmp_p
     assert not exported()
 
 
+def test_a_root_object_outdates_no_rig_unless_it_keeps_the_person_in_place(rig, tmp_path, capfd):
+    bpy.ops.scope.retarget()
+    bpy.context.view_layer.objects.active = person()
+    for mode, outdated in (("OBJECT", False), ("BONES", False), ("IN_PLACE", True)):
+        assert bpy.ops.scope.root_motion(mode=mode) == {"FINISHED"}
+        capfd.readouterr()
+        bpy.ops.scope.export(filepath=str(tmp_path / "hero.bvh"), format="BVH", which="RIG")
+        assert ("before it was changed" in capfd.readouterr().out) is outdated, mode
+
+
 def test_the_motion_of_a_former_capture_is_not_called_outdated(rig, tmp_path, capfd):
     bpy.ops.scope.retarget()
     former = rig.animation_data.action
