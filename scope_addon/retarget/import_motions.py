@@ -300,7 +300,7 @@ def convert(
     frames = source.frames - (source.frames[0] if begin is None else begin)
     times = frames / frames_per_second
     gaps_s = np.diff(times)
-    if (is_gap := gaps_s > _GAP_S).any():
+    if (is_gap := (gaps_s > _GAP_S) & (np.diff(frames) > 1)).any():
         begins = times[:-1][is_gap].tolist()
         notes.append(notice("frames_without_poses", times=begins, longest_s=float(gaps_s.max())))
     contact, floor = _standing(body, betas, poses, root, times)

@@ -264,6 +264,13 @@ def test_seconds_in_which_a_tracker_saw_nobody_are_said_to_be_guessed(tmp_path, 
         assert longest == pytest.approx((missing + 1) / RATE)
 
 
+def test_a_file_of_one_frame_per_second_lacks_no_poses(tmp_path):
+    np.savez(tmp_path / "slow.npz", **in_file("z") | {"mocap_framerate": 1.0})
+    imported = import_motion(tmp_path / "slow.npz")
+    assert imported.motion.mocap_framerate == 1.0
+    assert "frames_without_poses" not in [note.code for note in imported.notes]
+
+
 def test_another_rate_than_the_file_states_is_said_to_be_ignored(tmp_path):
     np.savez(tmp_path / "other.npz", **in_file("z"))
     (tmp_path / "own.npz").write_bytes(MOTION.to_bytes())
