@@ -5,6 +5,7 @@ not on the floor.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -97,10 +98,7 @@ def make_report(
         iterations=solved.iterations,
         cuts_s=[round(t, 3) for t in footage.cuts_s],
         warnings=footage.warnings
-        + (
-            repetition_warnings(name, float(video.fps), footage.picture_changes)
-            or freeze_warnings(name, footage.picture_changes, footage.timestamps)
-        )
+        + standstill_warnings(name, float(video.fps), footage)
         + unused_option_warnings(video, options)
         + speed_warnings(video, options)
         + up_warnings(name, solved.up_source, is_still)
@@ -207,6 +205,14 @@ def up_warnings(name: str, up_source: str, is_still: bool) -> list[Notice]:
     return [notice("guessed_up", footage=name, degrees=UP_DEVIATIONS_DEG[up_source][is_still])]
 
 
+def standstill_warnings(name: str, fps: float, footage: Footage) -> list[Notice]:
+    """Say where the picture stands still though what it shows does not."""
+    changes = footage.picture_changes
+    return repetition_warnings(name, fps, changes) or freeze_warnings(
+        name, changes, footage.timestamps, footage.cuts_s
+    )
+
+
 def repetition_warnings(name: str, fps: float, changes: Float64Array) -> list[Notice]:
     """Say that frames repeat the one before, as after a conversion to a higher frame rate: the
     picture stands still in these, apart from what compression changes, and leaps in the others.
@@ -236,12 +242,15 @@ def repetition_warnings(name: str, fps: float, changes: Float64Array) -> list[No
     return [notice("repeated_frames", footage=name, percent=100.0 * share, rate=fps / every)]
 
 
-def freeze_warnings(name: str, changes: Float64Array, times_s: Float64Array) -> list[Notice]:
+def freeze_warnings(
+    name: str, changes: Float64Array, times_s: Float64Array, cuts_s: Sequence[float]
+) -> list[Notice]:
     """Say where the picture stops at once and goes on at once, as where a recording stalls. What
     moves by itself slows down first.
 
     :param changes: (T,) of the picture from the frame before, see `SceneCuts`.
     :param times_s: (T,) of the frames.
+    :param cuts_s: when scenes begin, such as a title or a photograph, which may stand still.
     """
     is_still = changes < REPEATED_CHANGE * MOVING_CHANGE
     is_still[:1] = False  # has no frame before
@@ -249,9 +258,11 @@ def freeze_warnings(name: str, changes: Float64Array, times_s: Float64Array) -> 
     longest_s = 0.0
     for first, end in runs(is_still):
         stops_and_goes_on = end < len(changes) and min(changes[first - 1], changes[end])
-        length_s = float(times_s[end - 1] - times_s[first - 1])
-        if stops_and_goes_on > MOVING_CHANGE and length_s >= FROZEN_S:
-            begins_s.append(float(times_s[first - 1]))
+        begin_s = float(times_s[first - 1])
+        length_s = float(times_s[end - 1]) - begin_s
+        is_frozen = stops_and_goes_on > MOVING_CHANGE and length_s >= FROZEN_S
+        if is_frozen and begin_s not in cuts_s:
+            begins_s.append(begin_s)
             longest_s = max(longest_s, length_s)
     if not begins_s or np.median(np.diff(times_s)) > SLOWEST_STEP_S:
         return []

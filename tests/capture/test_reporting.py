@@ -310,7 +310,7 @@ def test_somebody_who_stops_and_goes_on_is_no_frozen_picture(fps, still_s):
     walk = np.ones(round(fps))
     speeds = np.r_[walk, ramp, np.zeros(round(fps * still_s)), ramp[::-1], walk]
     changes = changes_between(with_hand(60.0 + 40.0 * np.cumsum(speeds) / fps))
-    assert freeze_warnings("a.mp4", changes, np.arange(len(changes)) / fps) == []
+    assert freeze_warnings("a.mp4", changes, np.arange(len(changes)) / fps, []) == []
 
 
 @pytest.mark.parametrize("goes_on", [60, 80])  # as it would have, or where it is by then
@@ -320,10 +320,20 @@ def test_a_picture_that_freezes_amid_motion_is_said(fps, goes_on):
     changes = changes_of(np.r_[:60, [59] * count, goes_on : goes_on + 60])
     times_s = 2.0 + np.arange(len(changes)) / fps
     assert repetition_warnings("a.mp4", fps, changes) == []
-    (warning,) = freeze_warnings("a.mp4", changes, times_s)
+    (warning,) = freeze_warnings("a.mp4", changes, times_s, [])
     assert warning.code == "frozen_frames"
     assert warning.values["times"] == [pytest.approx(2.0 + 59 / fps)]
     assert warning.values["longest_s"] == pytest.approx(0.5)
+
+
+def test_a_title_between_two_scenes_is_no_frozen_picture():
+    walk = with_hand(60 + 2.0 * np.arange(60))
+    title = np.full((60, *ROOM.shape), 20.0)
+    title[:, 60:100, 80:240] = 240.0
+    changes = changes_between([*walk, *title, *(picture[:, ::-1] for picture in walk)])
+    times_s = np.arange(len(changes)) / RATE
+    assert freeze_warnings("a.mp4", changes, times_s, []) != []
+    assert freeze_warnings("a.mp4", changes, times_s, times_s[[60, 120]].tolist()) == []
 
 
 @pytest.mark.parametrize(("fps", "hz"), [(30.0, 1.5), (30.0, 2.5), (60.0, 5.0)])
@@ -336,7 +346,7 @@ def test_a_hand_that_waves_before_a_room_repeats_no_frames(fps, hz, form, reach)
     turns = 2 * np.pi * hz * (np.arange(120) + 0.5) / fps
     changes = changes_between(with_hand(160 + reach * form(turns)))
     assert repetition_warnings("a.mp4", fps, changes) == []
-    assert freeze_warnings("a.mp4", changes, np.arange(len(changes)) / fps) == []
+    assert freeze_warnings("a.mp4", changes, np.arange(len(changes)) / fps, []) == []
 
 
 def test_what_compression_does_to_somebody_who_stands_repeats_no_frames():

@@ -30,7 +30,7 @@ from ..observe import Footage, Watch, observe
 from ..options import CaptureOptions, check_options
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..pipeline import Capture, repaired, shot_of
-from ..reporting import freeze_warnings, make_report, repetition_warnings, speed_warnings
+from ..reporting import make_report, speed_warnings, standstill_warnings
 from ..solve import progress_of_person, solve_people
 from ..tracking.track import Track
 from ..world.assemble import Shot
@@ -555,13 +555,9 @@ def _about_footage(
     warnings: list[Notice] = []
     for view in views:
         name = Path(view.video.path).name
-        changes = view.footage.picture_changes
         for warning in (
             *view.footage.warnings,
-            *(
-                repetition_warnings(name, float(view.video.fps), changes)
-                or freeze_warnings(name, changes, view.footage.timestamps)
-            ),
+            *standstill_warnings(name, float(view.video.fps), view.footage),
             *speed_warnings(view.video, options),
         ):
             is_said = warning in said or warning in warnings

@@ -105,7 +105,10 @@ def test_warnings_about_every_video_are_said_once():
     views = [
         SimpleNamespace(
             footage=SimpleNamespace(
-                warnings=warnings, picture_changes=np.array(changes), timestamps=np.arange(40) / 30
+                warnings=warnings,
+                picture_changes=np.array(changes),
+                timestamps=np.arange(40) / 30,
+                cuts_s=[],
             ),
             video=SimpleNamespace(path=f"{name}.mp4", recorded_speed=speed, fps=30),
         )
