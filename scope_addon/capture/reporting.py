@@ -257,11 +257,11 @@ def freeze_warnings(
     begins_s = []
     longest_s = 0.0
     for first, end in runs(is_still):
-        stops_and_goes_on = end < len(changes) and min(changes[first - 1], changes[end])
+        if end == len(changes) or min(changes[first - 1], changes[end]) <= MOVING_CHANGE:
+            continue
         begin_s = float(times_s[first - 1])
         length_s = float(times_s[end - 1]) - begin_s
-        is_frozen = stops_and_goes_on > MOVING_CHANGE and length_s >= FROZEN_S
-        if is_frozen and begin_s not in cuts_s:
+        if length_s >= FROZEN_S and begin_s not in cuts_s:
             begins_s.append(begin_s)
             longest_s = max(longest_s, length_s)
     if not begins_s or np.median(np.diff(times_s)) > SLOWEST_STEP_S:

@@ -189,7 +189,8 @@ def _refuse_apart(rig: Object, apart: list[tuple[str, str]], bone_of: dict[str, 
         rig, [bone.name for chain in chains for bone in chain]
     )
     part, above = apart[0]
-    lower, upper = bone_of[part], bone_of[above]
+    lower = bone_of[part]
+    upper = bone_of[above]
     reason = f": mute {held}, or"
     advice = ""
     if not held:
