@@ -11,7 +11,7 @@ only.
 from __future__ import annotations
 
 import string
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -414,6 +414,12 @@ def _times(times_s: list[float], translate: Translate) -> list[str | TimeText]:
     for index, time in enumerate(listed[1:], 2):
         written += [f" {translate(AND)} " if index == len(listed) else ", ", time]
     return written
+
+
+def and_more(listed: Sequence[str], count: int, between: str = ", ") -> str:
+    """Return texts in a row, and how many of ``count`` are left out: ``a, b and 3 more``."""
+    more = count - len(listed)
+    return between.join(listed) + (f" and {more} more" if more > 0 else "")
 
 
 def counted(count: int, noun: str, nouns: str = "") -> str:

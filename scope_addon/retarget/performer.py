@@ -26,7 +26,7 @@ from ..errors import MotionFileError
 from ..kinematics.axes import R_WORLD_MODEL, UP, rotated, transposed
 from ..kinematics.frame_blocks import by_blocks
 from ..kinematics.smoothing import interpolate_rotations
-from ..notices import Notice, notice
+from ..notices import Notice, and_more, notice
 from ..untrusted.bvh_file import BvhMotion
 from .bone_map import REQUIRED, SIDED_PARTS, SPINE
 from .fingers import bone_ends
@@ -180,11 +180,10 @@ def _without_rest_pose(
     """
     missing = _missing(parts)
     if missing:
-        listed = ", ".join(file.names[:_LISTED])
-        more = len(file.names) - _LISTED
+        listed = and_more(file.names[:_LISTED], len(file.names))
         raise MotionFileError(
             f"{path}: none of its joints was recognized as {missing[0].replace('_', ' ')}; they "
-            f"are {listed}{f' and {more} more' if more > 0 else ''}; name them as Mixamo or SMPL do"
+            f"are {listed}; name them as Mixamo or SMPL do"
         )
     limbs = _limbs(file, parts)
     cosines = {name: (limbs @ axis).min(axis=1) for name, axis in axes.items()}

@@ -26,6 +26,7 @@ from ..arrays import Float32Array, Float64Array
 from ..errors import MotionFileError
 from ..kinematics.axes import transposed
 from ..kinematics.frame_blocks import by_blocks
+from ..notices import and_more
 from ..untrusted.tables import read_tables
 
 MAX_PEOPLE = 100  # of one file
@@ -191,8 +192,7 @@ def _contents(tables: Mapping[str, Any]) -> str:
         inner = f"{{{', '.join(list(value)[:_LISTED])}}}" if isinstance(value, dict) else ""
         shape = str(value.shape) if isinstance(value, np.ndarray) else ""
         listed.append(f"{key} {inner or shape}".strip()[:120])
-    more = len(tables) - len(listed)
-    return ", ".join(listed) + (f" and {more} more" if more > 0 else "") or "nothing"
+    return and_more(listed, len(tables)) or "nothing"
 
 
 def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:

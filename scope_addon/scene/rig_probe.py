@@ -22,7 +22,7 @@ from ...solver.errors import InputError
 from ...solver.rotations import log
 from ..arrays import BoolArray, Float64Array, IndexArray
 from ..kinematics.axes import transform_points, transposed, unscaled
-from ..notices import MAX_NAMES, Notice, notice
+from ..notices import MAX_NAMES, Notice, and_more, notice
 from ..retarget.bone_map import PHALANGES, check_bone_count
 from ..retarget.fingers import bone_ends
 from ..retarget.rest_pose import BoneMotion, RestPose, Skeleton
@@ -60,7 +60,7 @@ _TURNING = (
     *("TRACK_TO", "TRANSFORM", *_CHAINED),
 )
 _UNKNOWN = "the constraint or driver that controls the bone"
-# That are named in a message: those of four limbs, and of what their ends turn by.
+# How many are named in a message: enough for four limbs, with hands and feet.
 _MAX_CONSTRAINTS = 12
 # Of the lowest bone from the rig's origin, as a share of the rig's size.
 _MAX_LIFT = 0.17
@@ -139,13 +139,8 @@ def _controlling(rig: Object, names: Iterable[str]) -> str:
         if wanted.intersection(chain)
     ]
     several = "s" if len(found) > 1 else ""
-    return f"the constraint{several} {_listed(found, ' and ', _MAX_CONSTRAINTS)}" if found else ""
-
-
-def _listed(texts: list[str], between: str, most: int) -> str:
-    """Return texts in a row; of many, the first few and the number of the others."""
-    more = len(texts) - most
-    return between.join(texts[:most]) + (f" and {more} more" if more > 0 else "")
+    listed = and_more(found[:_MAX_CONSTRAINTS], len(found), " and ")
+    return f"the constraint{several} {listed}" if found else ""
 
 
 def _check_carried(
@@ -195,10 +190,9 @@ def _refuse_apart(rig: Object, apart: list[tuple[str, str]], bone_of: dict[str, 
     advice = ""
     if not held:
         reason = f", so they cannot be {part} and {above};".replace("_", " ")
-        for bone in upper.parent_recursive if above == "pelvis" else ():
-            if all(bone in chain for chain in chains):
-                advice = f", such as '{bone.name}' for the pelvis"
-                break
+        shared = [bone for bone in upper.parent_recursive if all(bone in chain for chain in chains)]
+        if above == "pelvis" and shared:
+            advice = f", such as '{shared[0].name}' for the pelvis"
     raise InputError(
         f"'{lower.name}' of '{rig.name}' does not move with '{upper.name}'{reason} choose other "
         f"bones in the bone map{advice}"
@@ -292,7 +286,7 @@ def _refuse_blocked(rig: Object, blocked: list[str], names: list[str]) -> None:
     :param names: of all mapped bones; constraints may turn more of them than those that stay still.
     :raises InputError: always.
     """
-    bones = _listed([f"'{name}'" for name in blocked], ", ", MAX_NAMES)
+    bones = and_more([f"'{name}'" for name in blocked[:MAX_NAMES]], len(blocked))
     held = held_bones(rig).intersection(names)
     one = len(blocked) == 1
     unknown = _UNKNOWN if one else "the constraints or drivers that control them"
