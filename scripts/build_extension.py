@@ -374,8 +374,8 @@ def manifest(target: Target, wheels: list[str], website: str = "") -> str:
 
 
 def with_licences(manifest: str, bill: str) -> str:
-    """Return a manifest that also states the licences of a bill of materials, of a choice the
-    first.
+    """Return a manifest that also states the licences of a bill of materials; where one can choose
+    between several, the first.
     """
     stated = tomllib.loads(manifest)["license"]
     expressions = re.findall(r'"expression": "([^"]+)"', bill)

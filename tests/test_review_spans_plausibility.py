@@ -243,7 +243,7 @@ def test_what_a_body_can_do_is_no_leap(acting: Callable[[], np.ndarray]) -> None
 
 
 def standing(shift_m: np.ndarray, fps: float) -> Motion:
-    """Return a person who stands still, moved sideways by (T,) metres."""
+    """Return a standing person whose body moves sideways by (T,) metres."""
     at = np.repeat(joints_in_world(WALK)[:1], len(WALK), axis=0)
     at[..., 0] += shift_m[:, None]
     joints = WALK.joints_cam.astype(float)

@@ -34,8 +34,8 @@ from .world.world_frame import GIVEN, LINES, UP_DEVIATIONS_DEG
 
 CLOSED = 0.5  # weight of a blink above which an eye is closed
 GIVEN_FLOOR_M = 0.03  # of the floor above or below z = 0 in the world of a given path
-# Relative deviation of the focal length from which on the path of a camera that travels is unsure:
-# of an estimate from few edges of the background, or none.
+# With this relative deviation of the focal length or more, as of an estimate from few edges of the
+# background or none, the path of a travelling camera is unsure.
 UNSURE_LENS = 0.15
 # Frames that repeat the one before change by less than this share of the largest changes that are
 # so near before and after them. Of 32 clips without such frames, at most 4 % of the frames do; of
@@ -46,10 +46,10 @@ REPEATED_SHARE = 0.1  # of the frames in which something moves
 # Of 255. While a person stands still, the changes that compression makes are mostly smaller.
 MOVING_CHANGE = 15.0
 FEWEST_STEPS = 20
-# Least time in which a picture that does not change between two in which something moves is frozen.
-# In 27 clips without such, changes beside as long a rest are at most 9.
+# A picture is frozen that stays the same for this long or longer, amid motion. In 27 clips without
+# frozen pictures, the changes before and after so long a standstill are at most 9.
 FROZEN_S = 0.2
-SLOWEST_STEP_S = 0.05  # from frame to frame; with longer ones, people stop from one to the next
+SLOWEST_STEP_S = 0.05  # between frames; with longer ones, people can stop from one to the next
 REPEATS_OFF = 0.15  # error of the mean number of frames that show one moment
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen
 

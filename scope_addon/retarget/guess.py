@@ -210,8 +210,8 @@ def _with_limbs(free: BoneMap, whole: BoneMap) -> BoneMap:
 def _irreplaceable(
     rest: RestPose, spare: Collection[str], whole: Mapping[str, str], free: Mapping[str, str]
 ) -> set[str]:
-    """Return the spare bones of limbs and spines that do not do without: none of the bones that
-    they have otherwise begins where a spare one does.
+    """Return the spare bones of limbs and spines that cannot do without them: none of the bones
+    that they have otherwise begins where a spare one does.
 
     :param whole: the parts of bones, guessed from all of them.
     :param free: those guessed without the spare ones.

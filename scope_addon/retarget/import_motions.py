@@ -48,7 +48,7 @@ _UNITS = {100: "cm", 1000: "mm"}
 _LESS_SLIP = 0.1
 _LESS_SLIP_THAN_IN_PLACE = 0.7
 _FASTEST_M_S = 60.0  # of a person for half of a clip: a skydiver
-_GAP_S = 0.5  # between two poses, above which the motion between them is a guess
+_GAP_S = 0.5  # with more between two poses, the motion between them is a guess
 _CAMERA_DISTANCE_M = 10.0  # in front of the nearest position; motion files need a camera
 
 
@@ -300,7 +300,8 @@ def convert(
     frames = source.frames - (source.frames[0] if begin is None else begin)
     times = frames / frames_per_second
     gaps_s = np.diff(times)
-    if (is_gap := (gaps_s > _GAP_S) & (np.diff(frames) > 1)).any():
+    is_gap = (gaps_s > _GAP_S) & (np.diff(frames) > 1)
+    if is_gap.any():
         begins = times[:-1][is_gap].tolist()
         notes.append(notice("frames_without_poses", times=begins, longest_s=float(gaps_s.max())))
     contact, floor = _standing(body, betas, poses, root, times)

@@ -105,7 +105,7 @@ def _select(
         X = -inverse @ np.delete(others[:, n:], np.s_[2 * n : 2 * n + GLOBALS], axis=1)
         cross = X @ later
         own = inverse @ inverse.T + cross @ X.T
-        own = 0.5 * (own + own.T)  # what rounding leaves of a difference grows from frame to frame
+        own = 0.5 * (own + own.T)  # otherwise, rounding errors grow from frame to frame
         S = np.block([[own, cross], [cross.T, later]])
         later = S[np.ix_(kept, kept)]
         J = motion_of_joints(tree, pose_of(poses, f))

@@ -34,8 +34,8 @@ class AssumedLens:
 
 # Between a phone's main camera and a camera's standard lens (40 to 54 degrees): 48 to 74 degrees.
 ANY_LENS = AssumedLens(60.0, 0.25)
-# Who films upright holds a phone. The main cameras of phones see 58 to 70 degrees in videos, with
-# and without the crop of their stabilization: 57 to 73 degrees.
+# Whoever films upright holds a phone, whose main camera sees 58 to 70 degrees in videos, with and
+# without the crop of its stabilization: 57 to 73 degrees.
 PHONE_LENS = AssumedLens(65.0, 0.15)
 FOCAL_STEP_PX = 2.0**-6  # to which estimates are rounded
 FILM_WIDTH_MM = 36.0  # "35 mm equivalent" focal lengths refer to this width along the longer side

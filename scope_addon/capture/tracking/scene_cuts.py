@@ -30,8 +30,8 @@ MIN_RATIO = 4.0  # to the usual difference
 PERSISTENCE = 0.7  # share of the difference that is left a frame later
 HISTORY_FRAMES = 15  # from which the usual difference is taken
 MIN_CONTRAST = 8.0  # standard deviation within a picture; a blank one has less
-# The frames before and after two that are the same differ by less than this share of their changes
-# from these if the picture turns back.
+# Where the picture turns back, the frames before and after two that are the same differ from each
+# other by less than this share of what they differ from those two by.
 TURNING_BACK = 0.5
 # Across a gap: standard deviations, mean over the picture and colours. Of eleven clips, frames half
 # a second apart differ by at most 0.44, 0.46 in all but one if half as bright again, and frames of

@@ -180,8 +180,8 @@ def reduce_keys(
     reduced = read_clip_at(armature, body, rate, frames)
     off = angles_between(channel_values(armature, body, reduced)[0], q)
     moved = np.linalg.norm(reduced.joints(body, betas) - clip.joints(body, betas), axis=-1)
-    pelvis_m, joint_m = float(moved[:, 0].max()), float(moved.max())
-    return Reduction(before, after, float(off.max()), pelvis_m, joint_m)
+    pelvis_m = float(moved[:, 0].max())
+    return Reduction(before, after, float(off.max()), pelvis_m, float(moved.max()))
 
 
 def channel_curves(armature: Object, body: Body) -> list[FCurve]:
