@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 import tokenize
-import warnings
 import zipfile
 import zlib
 from collections.abc import Hashable, Mapping
@@ -25,7 +24,7 @@ import numpy as np
 from .arrays import described
 from .body import Body
 from .body_checks import OPTIONAL_ARRAYS, REQUIRED_ARRAYS, check_arrays, check_body
-from .errors import InvalidValueError, ModelFileError, ScopeWarning
+from .errors import InvalidValueError, ModelFileError, warn_caller
 from .part import Array
 from .smpl_family import MAX_BETAS, smpl_body, stored_gender
 
@@ -118,7 +117,7 @@ def load_body(which: str | Path = "scope", betas: int = MAX_BETAS) -> Body:
     if "J_regressor" in arrays:
         body = smpl_body(arrays, path, betas)
         for surprise in _surprises(arrays, body):
-            warnings.warn(f"{path}: {surprise}", ScopeWarning, stacklevel=2)
+            warn_caller(f"{path}: {surprise}")
     else:
         body = scope_body(arrays, path)
     return replace(body, file=str(path.resolve()))

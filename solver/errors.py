@@ -16,6 +16,11 @@ is enough.
 Each message says what was wrong, with which file or value, and what to do about it.
 """
 
+from __future__ import annotations
+
+import sys
+import warnings
+
 
 class ScopeError(Exception):
     """Root of the tree."""
@@ -43,3 +48,14 @@ class ScopeWarning(UserWarning):
 
 class UnitsWarning(ScopeWarning):
     """Lengths are probably not in metres, or times not in seconds."""
+
+
+def warn_caller(message: str, kind: type[ScopeWarning] = ScopeWarning) -> None:
+    """Warn of what a caller of the solver gave, at the line outside this package that gave it."""
+    package = f"{__package__}."
+    level = 1
+    frame = sys._getframe()
+    while frame.f_back is not None and f"{frame.f_globals.get('__name__')}.".startswith(package):
+        frame = frame.f_back
+        level += 1
+    warnings.warn(message, kind, stacklevel=level)

@@ -13,13 +13,12 @@ that nothing is allocated. The lower half does the same on numpy arrays with any
 from __future__ import annotations
 
 import math
-import warnings
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import as_arrays
-from .errors import UnitsWarning
+from .errors import UnitsWarning, warn_caller
 from .kernel import kernel
 from .matrices import MINUS_EYE, add9, determinant, entries, product, transposed
 from .part import Array
@@ -149,11 +148,10 @@ def exp(phi: ArrayLike) -> Array:
     """
     phi = as_arrays(phi, (3,), "A rotation vector")
     if (np.abs(phi) > _SEVERAL_TURNS).any():
-        warnings.warn(
+        warn_caller(
             f"A rotation vector turns by {np.abs(phi).max():.6g} radians, several turns; convert "
             "degrees by numpy.radians.",
             UnitsWarning,
-            stacklevel=2,
         )
     # numpy's sinc(x) is sin(pi x) / (pi x)
     turns = np.linalg.norm(phi, axis=-1)[..., None, None] / np.pi

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import sys
-import warnings
 from collections.abc import Mapping
 from numbers import Integral
 from typing import Any
@@ -19,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import as_array, as_integers, described, has_axis
-from .errors import InvalidValueError, ScopeWarning, ShapeError, UnitsWarning
+from .errors import InvalidValueError, ScopeWarning, ShapeError, UnitsWarning, warn_caller
 from .kernel import kernel
 from .matrices import MINUS_EYE, add9, determinant, entries, product, transposed
 from .part import Array
@@ -239,10 +238,10 @@ def warn_of_units(points: Array, name: str) -> bool:
     """
     are_apart = far_apart(points)
     if are_apart:
-        _warn(
-            UnitsWarning,
+        warn_caller(
             f"{name} lie more than {LARGEST_STEP:g} m apart from one to the next, too far for a "
             f"person; {_UNITS}.",
+            UnitsWarning,
         )
     return are_apart
 
@@ -256,7 +255,7 @@ def warn_of_pixels(K: Array, pixels: Array, normalized: Array) -> None:
     fault = _fault_of_pixels(K, pixels, normalized)
     if fault:
         kind, message = _OF_PIXELS[fault]
-        _warn(kind, message.format(fx=K[0, 0], fy=K[1, 1], cx=K[0, 2], cy=K[1, 2]))
+        warn_caller(message.format(fx=K[0, 0], fy=K[1, 1], cx=K[0, 2], cy=K[1, 2]), kind)
 
 
 def warn_of_points(points: Array, has_camera: bool, are_weights: bool) -> None:
@@ -270,7 +269,7 @@ def warn_of_points(points: Array, has_camera: bool, are_weights: bool) -> None:
     warn_of_units(points, "Points of 3D keypoints")
     fault = _fault_of_points(points)
     if fault and (has_camera or fault not in _OF_CAMERA) and not (fault == 2 and are_weights):
-        _warn(ScopeWarning, _OF_POINTS[fault])
+        warn_caller(_OF_POINTS[fault])
 
 
 _TOO_CONFIDENT = (
@@ -321,10 +320,6 @@ _OF_POINTS = {
 _OF_CAMERA = (1, 4)  # without one, points may lie anywhere
 
 
-def _warn(kind: type[ScopeWarning], message: str) -> None:
-    warnings.warn(message, kind, stacklevel=4)
-
-
 def warn_of_repeated(indices: Array, rows: Array, name: str) -> None:
     """Warn of keypoints of which one point lies at two places.
 
@@ -332,10 +327,9 @@ def warn_of_repeated(indices: Array, rows: Array, name: str) -> None:
     """
     k = _first_elsewhere(indices, rows)
     if k >= 0:
-        _warn(
-            ScopeWarning,
+        warn_caller(
             f"{name} have point {indices[k]} twice, at places that are far apart; give each point "
-            "its own name or number (joint i is M + i).",
+            "its own name or number (joint i is M + i)."
         )
 
 
@@ -349,10 +343,9 @@ def warn_of_one_confidence(given: ArrayLike, rows: Array, name: str, sigma: str)
         return
     value = rows[0, -1]
     if 0.0 < value < _LEAST_CONFIDENT or value > 1.0:
-        _warn(
-            ScopeWarning,
+        warn_caller(
             f"{name} is {value:g} for all of them, which makes all their weights {value:g} times "
-            f"what they are without; if it is a standard deviation, give it as {sigma}.",
+            f"what they are without; if it is a standard deviation, give it as {sigma}."
         )
 
 
@@ -367,16 +360,16 @@ def warn_of_distance(points: Array, name: str) -> bool:
     known = distances[distances < _FARTHEST_MM]
     is_far = len(known) > 0 and known.min() > _FARTHEST
     if is_far:
-        _warn(UnitsWarning, f"{name} more than {_FARTHEST:g} m away; {_UNITS}.")
+        warn_caller(f"{name} more than {_FARTHEST:g} m away; {_UNITS}.", UnitsWarning)
     return is_far
 
 
 def warn_of_deviations(sigmas: Array, least: float, most: float, name: str, unit: str) -> None:
     """Warn of standard deviations (n,) all of which are too small or large, with `UnitsWarning`."""
     if len(sigmas) and (sigmas.max() < least or sigmas.min() > most):
-        _warn(
-            UnitsWarning,
+        warn_caller(
             f"{name} is {sigmas[0]:g} {unit}, which no measurement has; it must be in {unit}.",
+            UnitsWarning,
         )
 
 
@@ -387,21 +380,19 @@ def warn_of_floor(normal: Array, offset: float, points: Array, has_camera: bool)
     :param has_camera: without one, the axes may be any.
     """
     if has_camera and (normal[1] > _STEEPEST or normal[2] > _AHEAD):
-        _warn(
-            ScopeWarning,
+        warn_caller(
             "The floor's normal points down or away from the camera, but must point up, about "
-            "(0, -1, 0) in camera axes; negate normal and offset, or turn them to these axes.",
+            "(0, -1, 0) in camera axes; negate normal and offset, or turn them to these axes."
         )
         return
     warn_of_distance(np.array([[0.0, 0.0, offset]]), "The floor lies")
     below = offset - points @ normal
     below = below[np.isfinite(below)]
     if len(below) >= _FEWEST_POINTS and _BELOW_M < np.median(below) < LARGEST_STEP:
-        _warn(
-            ScopeWarning,
+        warn_caller(
             f"Most 3D keypoints lie more than {_BELOW_M:g} m below the floor; its normal must "
             "point up, and its offset is normal^T p of a point p of it, which is negative where "
-            "the floor is below the camera.",
+            "the floor is below the camera."
         )
 
 
@@ -412,38 +403,35 @@ def warn_of_start(t_camera_root: Array, in_image: bool) -> None:
     """
     warn_of_distance(t_camera_root[None], "t_camera_root of init lies")
     if in_image and t_camera_root[2] <= 0.0:
-        _warn(
-            ScopeWarning,
+        warn_caller(
             "t_camera_root of init lies behind the camera, z < 0; camera axes are x right, y down, "
-            "z forward.",
+            "z forward."
         )
 
 
 def warn_of_percentages(probabilities: Array, name: str) -> None:
     """Warn of probabilities (n,) far above 1."""
     if probabilities.max(initial=0.0) > _MOST_CONFIDENT:
-        _warn(ScopeWarning, f"{name} is far above 1; divide percentages by 100.")
+        warn_caller(f"{name} is far above 1; divide percentages by 100.")
 
 
 def warn_of_kernel(sigma: float, most: float, name: str) -> None:
     """Warn of a robust kernel's sigma that is probably no squared residual, with `UnitsWarning`."""
     if most < sigma < math.inf:
-        warnings.warn(
+        warn_caller(
             f"{name} is {sigma:g}, but is a squared residual, in normalized image coordinates or "
             "metres; infinity turns the kernel off.",
             UnitsWarning,
-            stacklevel=4,
         )
 
 
 def warn_of_weight(weight: float, least: float, name: str) -> None:
     """Warn of a weight that is probably a standard deviation, with `UnitsWarning`."""
     if 0.0 < weight < least:
-        warnings.warn(
+        warn_caller(
             f"{name} is {weight:g}, but weights are 1/sigma^2, in squared metres or normalized "
             "image coordinates; give deviations as sigma_px or sigma_m.",
             UnitsWarning,
-            stacklevel=4,
         )
 
 
@@ -458,12 +446,12 @@ def warn_of_frame_numbers(times: Array) -> None:
     are_whole = not (times % 1.0).any()
     if are_whole or np.median(np.diff(times)) > _LONGEST_INTERVAL:
         kind = "whole numbers" if are_whole else "far apart"
-        _warn(
-            UnitsWarning,
+        warn_caller(
             f"times are {kind}, {times[0]:g}, {times[1]:g}, {times[2]:g}, …, probably frame "
             "numbers or milliseconds instead of seconds; divide frame numbers by the frame rate, "
             "milliseconds by 1000. For frames that are seconds apart, give smaller weights of "
             "acceleration than MotionPrior's.",
+            UnitsWarning,
         )
 
 

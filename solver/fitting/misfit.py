@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import as_array, as_numbers
-from ..errors import ScopeWarning
+from ..errors import warn_caller
 from ..measurements import LARGEST, SIGMA_2D, Keypoints2D, Keypoints3D, Measurements
 from ..options import Priors
 from ..part import Array
@@ -149,12 +149,10 @@ def warn_of_wrong_points(tree: Tree, measurements: Measurements, found: Fit) -> 
     # beyond, another warning tells of the unit of points, but none of that of one's own residuals
     is_far = most < off < (math.inf if measurements.tables else LARGEST_STEP)
     if is_far:
-        warnings.warn(
+        warn_caller(
             f"The body fits the 3D keypoints badly, by {off:.2f} m in the median; check "
             "that each has its own point, by name or by number (joint i is M + i), that the "
-            "intrinsics belong to pixels of this size, and residuals of your own are in metres.",
-            ScopeWarning,
-            stacklevel=3,
+            "intrinsics belong to pixels of this size, and residuals of your own are in metres."
         )
     return is_far
 
@@ -177,13 +175,11 @@ def warn_of_wrong_pixels(tree: Tree, measurements: Measurements, found: Fit) -> 
     extent = np.ptp(pixels, axis=0).max()
     is_far = off > max(_FAR_SIGMAS * float(stated), _FAR_IN_IMAGE * float(extent))
     if is_far:
-        warnings.warn(
+        warn_caller(
             f"The body fits the 2D keypoints badly, by {off:.0f} pixels in the median; check that "
             "each has its own point, by name or by number, that the intrinsics belong to pixels of "
             "this size, and that other measurements are of the same person and time, and residuals "
-            "of your own in metres.",
-            ScopeWarning,
-            stacklevel=3,
+            "of your own in metres."
         )
     return is_far
 
@@ -218,13 +214,11 @@ def warn_of_unlikely_shape(betas: Sequence[Array], priors: Priors) -> None:
         return
     deviations = sorted(float(np.linalg.norm(beta)) for beta in betas)[len(betas) // 2]
     if deviations > math.sqrt(len(betas[0])) + _UNLIKELY:
-        warnings.warn(
+        warn_caller(
             f"The fitted shape is {deviations:.0f} standard deviations from the mean of people, "
             "farther than anyone's; check that lengths are in metres, that each point has its own "
             "name or number (joint i is M + i), that the intrinsics belong to pixels of this size, "
-            "that init, if given, is near, and that deviations are not stated too small.",
-            ScopeWarning,
-            stacklevel=3,
+            "that init, if given, is near, and that deviations are not stated too small."
         )
 
 
@@ -262,11 +256,9 @@ def warn_of_mirroring(
     :param refit: fits a frame from a cold start with the same priors.
     """
     if frames and not count:
-        warnings.warn(
+        warn_caller(
             "Nothing that was measured is usable, so that no pose is known; check that numbers are "
-            "not NaN, and confidences above 0.",
-            ScopeWarning,
-            stacklevel=4,
+            "not NaN, and confidences above 0."
         )
         return True
     cost /= max(1, count)
@@ -315,11 +307,7 @@ def warn_of_mirroring(
                 best = ""
     if not best:
         return False
-    warnings.warn(
-        f"A body fits what was measured far better in other axes; {best}.",
-        ScopeWarning,
-        stacklevel=4,
-    )
+    warn_caller(f"A body fits what was measured far better in other axes; {best}.")
     return True
 
 

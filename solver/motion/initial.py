@@ -3,14 +3,13 @@
 first.
 """
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
-from ..errors import ScopeWarning
+from ..errors import warn_caller
 from ..fitting.clip import Camera, fit_in_order
 from ..fitting.misfit import IMAGE_REMEDIES
 from ..measurements import Keypoints3D, Measurements
@@ -161,9 +160,7 @@ def warn_of_cameras(frames: Sequence[Sequence[View]], points: int) -> bool:
         )
     else:
         return False
-    warnings.warn(
-        f"The cameras' rays to a point miss each other, but {what}.", ScopeWarning, stacklevel=3
-    )
+    warn_caller(f"The cameras' rays to a point miss each other, but {what}.")
     return True
 
 

@@ -377,8 +377,9 @@ PROBABLE_MISTAKES = {
 
 @pytest.mark.parametrize(("make", "message"), PROBABLE_MISTAKES.values(), ids=PROBABLE_MISTAKES)
 def test_what_is_probably_a_mistake_brings_a_warning(make, message):
-    with pytest.warns(ScopeWarning, match=message):
+    with pytest.warns(ScopeWarning, match=message) as told:
         make()
+    assert told[0].filename == __file__
 
 
 NOT_REFUSED = {

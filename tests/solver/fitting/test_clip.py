@@ -142,8 +142,9 @@ def test_frames_share_the_shape_and_those_left_out_are_fitted_to_it():
 
 def test_a_clip_without_measurements_ends_well():
     body, *_ = clip(9, frames=1)
-    with pytest.warns(ScopeWarning, match="Nothing that was measured is usable"):
+    with pytest.warns(ScopeWarning, match="Nothing that was measured is usable") as told:
         empty = fit_clip(body, [Measurements(), Measurements()], focal=True)
+    assert told[0].filename == __file__
     assert empty.status is Status.NO_MEASUREMENTS
     assert empty.focal_scale == 1.0
     np.testing.assert_array_equal(empty.beta, np.zeros(P))

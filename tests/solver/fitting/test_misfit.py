@@ -91,8 +91,9 @@ def test_mirrored_measurements_are_told(change, message):
     body, everyone = people()
     seen = everyone[0].seen
     for each in (seen, without_deviations(seen)):
-        with pytest.warns(ScopeWarning, match=message):
+        with pytest.warns(ScopeWarning, match=message) as told:
             solver.fit(body, change(each))
+        assert told[0].filename == __file__
 
 
 IMAGE_MISTAKES = {
@@ -105,8 +106,9 @@ IMAGE_MISTAKES = {
 def test_of_several_frames_2d_keypoints_alone_show_it(change, message):
     body, everyone = people()
     frames = [in_image(replace(each.seen, keypoints3d=None), change) for each in everyone]
-    with pytest.warns(ScopeWarning, match=message):
+    with pytest.warns(ScopeWarning, match=message) as told:
         solver.fit_batch(body, frames)
+    assert told[0].filename == __file__
 
 
 def left_for_right(p):

@@ -75,6 +75,7 @@ def test_of_wrong_cameras_nothing_else_is_told():
     with pytest.warns(ScopeWarning) as told:
         solver.fit_motion(people()[0], [views_around(**TRANSPOSED)], [0.0])
     assert len(told) == 1
+    assert told[0].filename == __file__
     assert "transpose R_camera_world" in str(told[0].message)
 
 
@@ -85,6 +86,7 @@ def test_cameras_placed_in_centimetres_or_millimetres_are_told_once(scale):
     with pytest.warns(UnitsWarning) as told:
         solver.fit_motion(people()[0], views, [0.0, 0.1, 0.2])
     assert len(told) == 1
+    assert told[0].filename == __file__
     assert "t_camera_world" in str(told[0].message)
     assert "centimetres by 100, millimetres by 1000" in str(told[0].message)
 
@@ -96,6 +98,7 @@ def test_two_cameras_whose_poses_are_inverted_see_a_mirrored_person():
     with pytest.warns(ScopeWarning, match=r"in views, give R\^T and -R\^T t") as told:
         solver.fit_motion(people()[0], [views[:2]], [0.0])
     assert len(told) == 1
+    assert told[0].filename == __file__
 
 
 def test_cameras_at_one_height_that_measure_from_below_see_a_mirrored_person():
