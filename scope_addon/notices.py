@@ -152,7 +152,7 @@ SENTENCES = {
     "alone, because no floor is seen in the background, so their paths may be a third too short, "
     "or more; check how far they travel",
     "travel_by_lens": "{footage}: the camera travels, and its focal length is a guess, so the "
-    "people's paths may be wrong by a quarter; give the focal length or the field of view",
+    "people's paths may be wrong by {percent:.0f} %; give the focal length or the field of view",
     "zoom": "{footage}: the lens zooms, but by how much is not known everywhere, because the "
     "camera also travels, or too little of the background is seen, so people may come nearer or go "
     "away wrongly; capture the parts without zoom separately, with a start and end time",

@@ -176,7 +176,8 @@ def camera_warnings(name: str, footage: Footage, solved: Solved) -> list[Notice]
     elif solved.travel_source == FEET:
         warnings.append(notice("travel_by_feet", footage=name))
     elif solved.travel_source is not None and footage.camera.focal_deviation >= UNSURE_LENS:
-        warnings.append(notice("travel_by_lens", footage=name))
+        percent = 100.0 * footage.camera.focal_deviation
+        warnings.append(notice("travel_by_lens", footage=name, percent=percent))
     if footage.world_from_camera is not None:
         lowered_m = (
             footage.world_from_camera[0, 2, 3] - solved.motions[0].world_from_camera[0, 2, 3]

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture import reporting
+from scope.scope_addon.capture.camera.intrinsics import assumed_camera
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.options import capture_options
 from scope.scope_addon.capture.reporting import (
@@ -22,6 +23,7 @@ from scope.scope_addon.capture.reporting import (
     up_warnings,
 )
 from scope.scope_addon.capture.tracking.scene_cuts import SceneCuts
+from scope.scope_addon.capture.world.travel_scale import FLOOR
 from scope.scope_addon.capture.world.world_frame import BODIES, LINES
 from scope.scope_addon.options import Place, options_at
 from scope.solver import load_body, rotations
@@ -196,6 +198,24 @@ def test_a_zoom_of_which_some_may_be_missing_is_told(motion, is_certain, codes):
     solved = SimpleNamespace(travel_source=None, motions=[motion], contradictions=[None])
     warnings = camera_warnings("made.mp4", footage, solved)
     assert [warning.code for warning in warnings] == codes
+
+
+@pytest.mark.parametrize(
+    ("size", "told"),
+    [((1280, 720), "paths may be wrong by 25 %;"), ((720, 1280), "paths may be wrong by 15 %;")],
+)
+def test_a_path_is_as_wrong_as_the_lens_that_is_assumed(motion, size, told):
+    """An upright picture is a phone's, whose lens is known better than others."""
+    footage = SimpleNamespace(
+        zoom=None,
+        timestamps=motion.timestamps,
+        world_from_camera=None,
+        camera=assumed_camera(*size, size),
+    )
+    solved = SimpleNamespace(travel_source=FLOOR, motions=[motion], contradictions=[None])
+    (found,) = camera_warnings("made.mp4", footage, solved)
+    assert found.code == "travel_by_lens"
+    assert told in str(found)
 
 
 VALUES = {each.name: each.default for each in options_at(Place.WORKER)}
