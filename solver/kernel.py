@@ -72,7 +72,11 @@ def cached(compiled: Any) -> Any:
 
 
 def is_compiled(compiled: Any) -> bool:
-    """Whether a kernel's machine code is in memory or, as it seems, on disk."""
+    """Whether a kernel's machine code is in memory or, as it seems, on disk; or whether none is to
+    be made, where numba is configured not to compile at all.
+    """
+    if not hasattr(compiled, "signatures"):
+        return True
     return bool(compiled.signatures) or _keeper.has_code(compiled)
 
 
