@@ -3,7 +3,7 @@
 body part.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -33,9 +33,6 @@ _RANGES = {
     "indices": (0, None),
 }
 _UNLIMITED = np.iinfo(np.int64).max
-_TABLES = list(RESIDUALS)
-# Of the tables that say where a body is, the first column of a row's weights.
-_WEIGHED = {"foot_contact": 3, "floor": 4, "outline": 7}
 
 
 class Terms(NamedTuple):
@@ -306,17 +303,22 @@ def fill_terms(
 
 def usable(terms: Terms, slots: int | None = None) -> tuple[int, int]:
     """Return how many points, directions and poses were measured, and these with all else that
-    fixes where a body is: contacts, floor, outline and residuals from outside. Priors do not count.
+    says where a body is: contacts, floor, outline and further residuals. Priors do not count.
 
     :param slots: of points and directions in use, if it is known.
     """
     if slots is None:
         slots = int(np.count_nonzero(terms.flags & ~HAS_SHAPE))
-    seen = slots + len(terms.ints[_TABLES.index("pose_prior")])
-    everything = seen + int(terms.external.calls[:, 1].sum())
-    for name, first_weight in _WEIGHED.items():
-        rows = terms.floats[_TABLES.index(name)]
-        if len(rows):
-            weights = rows[:, first_weight : first_weight + 2]
-            everything += int(np.count_nonzero((weights > 0.0).any(axis=1)))
-    return seen, everything
+    rows = {
+        name: _count_measured(RESIDUALS[name], floats)
+        for name, floats in zip(RESIDUALS, terms.floats, strict=True)
+    }
+    everything = slots + int(terms.external.calls[:, 1].sum()) + sum(rows.values())
+    return slots + rows["pose_prior"], everything
+
+
+def _count_measured(residual: Any, floats: Array) -> int:
+    """Return how many rows (n, FLOATS) of a residual count as measured."""
+    if not len(floats) or not hasattr(residual, "WEIGHTS"):
+        return len(floats)
+    return int(np.count_nonzero((floats[:, residual.WEIGHTS] > 0.0).any(axis=1)))

@@ -20,6 +20,7 @@ from .accumulation import add_to_point, lever, rows_of
 INTS = 1  # point, numbered as in the measurements
 FLOATS = 6  # n (3), a unit vector, d, w_below, w_above
 INDEXES = "points"
+WEIGHTS = slice(4, 6)
 
 
 @kernel

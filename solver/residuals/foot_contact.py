@@ -16,6 +16,7 @@ from .accumulation import add_to_point, lever, rows_of
 INTS = 1  # point, numbered as in the measurements
 FLOATS = 4  # p_stand (3), w
 INDEXES = "points"
+WEIGHTS = slice(3, 4)
 
 
 @kernel

@@ -53,6 +53,7 @@ SIZE = LAST + 14  # of a joint's parameters
 INTS = LANES  # joints, 0 for none: one row holds several
 FLOATS = LANES * (SIZE + 1)  # their parameters, then w, each as LANES values
 INDEXES = "parts"
+WEIGHTS = slice(0)  # says nothing of where the body is
 _W = SIZE
 NEAREST = 1e-4  # radians to pi
 _MIN_TRACE = 4.0 * math.sin(0.5 * NEAREST) ** 2  # of 1 + tr MᵀOmega = 4 cos^2(angle / 2)

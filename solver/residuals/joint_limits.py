@@ -26,6 +26,7 @@ from .accumulation import add_to_joint, rows_of
 INTS = 1  # joint
 FLOATS = 8  # axis (3), lower, upper, swing_limit, w, w_swing
 INDEXES = "joints"
+WEIGHTS = slice(0)  # says nothing of where the body is
 
 # Axis in the parent's rest axes of SMPL's T-pose (x to the person's left, y up, z forward), lower,
 # upper, swing limit. A knee bends the shin backwards; an elbow brings the forearm forwards, and

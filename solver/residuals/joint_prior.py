@@ -19,6 +19,7 @@ from .accumulation import add_to_joint, relative_log, rows_of
 INTS = 1  # joint
 FLOATS = 10  # Omega_mean (9) by rows, w
 INDEXES = "joints"
+WEIGHTS = slice(0)  # says nothing of where the body is
 
 
 @kernel

@@ -26,6 +26,7 @@ from .keypoint2d import Z_MIN
 INTS = 1  # point, numbered as in the measurements
 FLOATS = 11  # delta (3), m (2), n (2), w_out, w_in, 1/sigma_out, 1/sigma_in
 INDEXES = "points"
+WEIGHTS = slice(7, 9)
 
 
 @kernel

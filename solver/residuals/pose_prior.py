@@ -19,6 +19,7 @@ from .accumulation import add_to_point, relative_log, rows_of
 INTS = 1  # part
 FLOATS = 14  # R^ (9) by rows, t^ (3), w_R, w_t
 INDEXES = "parts"
+WEIGHTS = slice(12, 14)
 
 
 @kernel

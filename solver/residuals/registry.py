@@ -9,6 +9,9 @@ A residual r_i(T_i, Omega_i, beta) in addition to the measurements is a module w
     INDEXES
         what all its whole numbers count: "points" as in the measurements, "parts" 0..K or "joints"
         1..K. Rows outside are refused; without it, negative ones
+    WEIGHTS
+        slice of its other numbers, a row's weights: a row counts as measured where one is above 0;
+        without it, every row. slice(0) for what does not say where a body is, so that no row does
     accumulate(tree, ints, floats, weight, pose, blocks) -> cost
         compiled with @kernel; adds JᵀJ and Jᵀr to `Blocks` (see part.py)
 

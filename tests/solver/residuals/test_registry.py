@@ -61,6 +61,11 @@ place_parts(tree, pose)
 terms = terms_of(2)
 cost = registry.accumulate_tables(tree, terms.ints, terms.floats, stage[0], pose, blocks)
 print(cost, *blocks.A[2, :, GRADIENT])
+
+start = solver.State(np.eye(3), pose.t[0].copy(), np.tile(np.eye(3), (2, 1, 1)), np.zeros(1))
+rows = solver.Measurements(tables={"toy": ([[2]], [[-0.5, 1.0]])})
+found = solver.fit(body, rows, init=start, priors=solver.Priors(joint_weights=np.zeros(2)))
+print(found.measurements, found.t_camera_part[2, 1])
 for part, declared in ((3, True), (-1, True), (-1, False)):
     if not declared and hasattr(toy, "INDEXES"):
         del toy.INDEXES
@@ -96,12 +101,16 @@ def test_one_file_its_import_and_one_line_add_a_residual(tmp_path):
         command, env=environment, cwd=empty, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    first, *refused = done.stdout.splitlines()
+    first, fitted, *refused = done.stdout.splitlines()
     # At rest part 2 lies at (0.5, 0.5, 3), (0.4, 0.3, 0) from the pelvis: r = 0.5 - (-0.5), the
     # force is w r upwards.
     cost, *gradient = map(float, first.split())
     np.testing.assert_allclose(cost, 0.5 * 8.0)
     np.testing.assert_allclose(gradient, [0.0, 0.0, 0.4 * 8.0, 0.0, 8.0, 0.0], atol=1e-12)
+    # The residual alone moves the body.
+    measured, height = map(float, fitted.split())
+    assert measured == 1
+    np.testing.assert_allclose(height, -0.5, atol=1e-6)
     assert refused == [
         "Parts of 'toy' must lie in 0..2, but go from 3 to 3.",
         "Parts of 'toy' must lie in 0..2, but go from -1 to -1.",
