@@ -3,6 +3,7 @@
 
 import sys
 import threading
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -81,7 +82,8 @@ def test_a_file_that_cannot_be_read_in_time_is_as_late_as_it_is_and_said_once():
 def test_slow_motion_is_played_at_the_speed_of_what_happened(monkeypatch):
     def tagged(path):
         video = open_video(path)
-        video.recorded_speed = 8.0
+        assert video.rate is not None
+        video.rate = replace(video.rate, recorded_speed=8.0)
         return video
 
     monkeypatch.setattr(live_source, "open_video", tagged)

@@ -64,6 +64,18 @@ _PIECE_BYTES = 1 << 20
 _QUEUED_FRAMES = 4  # decoded ahead; a 4K frame takes 25 MB
 
 
+@dataclass(frozen=True)
+class StatedRate:
+    """How many frames a second a file has, and how it times them."""
+
+    usual_fps: Fraction
+    average_fps: Fraction  # over the whole file; another one where the rate varies
+    is_even: bool = True  # a frame's time tells its number
+    is_counted: bool = False  # the container counts the frames
+    # How many times as fast as it plays the footage was recorded, according to the file.
+    recorded_speed: float = 1.0
+
+
 @dataclass
 class Video:
     """Open footage, whose first frame could be decoded. Each iteration starts at the first frame of
@@ -83,14 +95,9 @@ class Video:
     focal_35mm: float | None = None
     warnings: list[Notice] = field(default_factory=list)
     wanted: VideoRange = field(default_factory=VideoRange)
-    # How many times as fast as it plays the footage was recorded, according to the file.
-    recorded_speed: float = 1.0
-    _source_fps: Fraction | None = field(default=None, repr=False)
-    _average_fps: Fraction | None = field(default=None, repr=False)
+    rate: StatedRate | None = field(default=None, repr=False)  # None: even, at ``fps``
     _sequence: PictureSequence | None = field(default=None, repr=False)
     _still: Uint8Array | None = field(default=None, repr=False)
-    _is_even: bool = field(default=True, repr=False)  # a frame's time tells its number
-    _is_counted: bool = field(default=False, repr=False)  # by the container
     _is_part: bool = field(default=False, repr=False)  # see `frames_from`
     _bytes: int | None = field(default=None, repr=False)  # of the file when it was opened
     _decoders: list[_Decoder] = field(default_factory=list, repr=False)
@@ -103,12 +110,17 @@ class Video:
     @property
     def source_fps(self) -> Fraction:
         """Frame rate of the file, frames per second."""
-        return self._source_fps or self.fps
+        return self.rate.usual_fps if self.rate else self.fps
 
     @property
     def average_fps(self) -> Fraction:
         """Frame rate over the whole file, which differs from `source_fps` where the rate varies."""
-        return self._average_fps or self.source_fps
+        return self.rate.average_fps if self.rate else self.fps
+
+    @property
+    def recorded_speed(self) -> float:
+        """How many times as fast as it plays the footage was recorded, according to the file."""
+        return self.rate.recorded_speed if self.rate else 1.0
 
     @property
     def expected_frames(self) -> int:
@@ -323,72 +335,82 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
                 f"{path} can be opened, but none of its frames can be decoded; "
                 "convert it to H.264 .mp4"
             )
-        stated_fps = exact_fps(reader.rate)
-        fps = stated_fps or DEFAULT_FPS
-        average_fps = exact_fps(reader.average_rate) if reader.is_counted else None
-        if stated_fps is None or average_fps is None or _varies(average_fps, fps):
-            usual_fps, packets_fps = packet_rates(path, fps, reader.may_have_field_packets)
-            average_fps = average_fps or packets_fps
-            if stated_fps is None or _varies(average_fps, fps):
-                fps = usual_fps
-        if not _varies(average_fps, fps):
-            average_fps = fps
-        # Frames that an even rate would have and the file has not, or the reverse: a phone leaves
-        # some out, also where its rate counts as constant.
-        missing_frames = abs(float(fps) * (reader.shown_s or 0.0) - reader.frame_count)
-        recorded_speed = reader.recorded_rate / float(fps)
+        rate = _stated_rate(path, reader)
         count = reader.frame_count
+        claimed = reader.shown_s * rate.average_fps if reader.shown_s else count
         flip = ("Y" if reader.clockwise_deg % 180 == 0 else "X") if reader.is_mirrored else ""
-    width, height = requested.view.size(first[1].shape[1], first[1].shape[0])
-    claimed = reader.shown_s * average_fps if reader.shown_s else count
     frame_count = max(1, round(claimed)) if 0 < claimed < 1e9 else 1
-    wanted = requested.at_rate(fps)
-    video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
-    video._average_fps = average_fps
-    video._is_counted = reader.is_counted
-    video._is_even = reader.counts_frames_alone and missing_frames < _ONE_MISSING
-    if recorded_speed > _SLOW_MOTION:
-        video.recorded_speed = recorded_speed
-    if _varies(average_fps, fps):
-        video.warnings.append(
-            notice(
-                "variable_frame_rate",
-                footage=path.name,
-                rate=float(fps),
-                average=float(average_fps),
-            )
-        )
-    if flip:
-        video.warnings.append(notice("mirrored", footage=path.name, axis=flip))
-    if wanted.start_s > 0 and count > 0 and wanted.start_s * average_fps > frame_count + fps:
+    wanted = requested.at_rate(rate.usual_fps)
+    if (
+        wanted.start_s > 0
+        and count > 0
+        and wanted.start_s * rate.average_fps > frame_count + rate.usual_fps
+    ):
         raise VideoError(
-            f"{path} lasts {frame_count / float(average_fps):.1f} s, but the start is at "
+            f"{path} lasts {frame_count / float(rate.average_fps):.1f} s, but the start is at "
             f"{wanted.start_s:g} s; start earlier"
         )
+    width, height = requested.view.size(first[1].shape[1], first[1].shape[0])
+    fps = rate.usual_fps if wanted.fps is None else min(wanted.fps, rate.usual_fps)
+    video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted, rate=rate)
+    video.warnings += _rate_notices(path.name, rate)
+    if flip:
+        video.warnings.append(notice("mirrored", footage=path.name, axis=flip))
     if wanted.fps is not None:
-        video._source_fps = fps
-        video.fps = min(wanted.fps, fps)
-        even_fps = fps / round(fps / video.fps)
-        if _varies(video.fps, even_fps):
-            video.warnings.append(
-                notice(
-                    "uneven_frames",
-                    footage=path.name,
-                    rate=float(fps),
-                    wanted=float(wanted.fps),
-                    even=float(even_fps),
-                )
-            )
-        if wanted.fps > fps:
-            video.warnings.append(
-                notice(
-                    "frame_rate_above_footage",
-                    footage=path.name,
-                    rate=float(fps),
-                    wanted=float(wanted.fps),
-                )
-            )
+        video.warnings += _sampling_notices(path.name, rate.usual_fps, wanted.fps)
     return video
+
+
+def _stated_rate(path: Path, reader: PyavReader) -> StatedRate:
+    """Return the rate of a file, counted in its packets where the container does not state it, or
+    where it varies.
+    """
+    stated_fps = exact_fps(reader.rate)
+    fps = stated_fps or DEFAULT_FPS
+    average_fps = exact_fps(reader.average_rate) if reader.is_counted else None
+    if stated_fps is None or average_fps is None or _varies(average_fps, fps):
+        usual_fps, packets_fps = packet_rates(path, fps, reader.may_have_field_packets)
+        average_fps = average_fps or packets_fps
+        if stated_fps is None or _varies(average_fps, fps):
+            fps = usual_fps
+    if not _varies(average_fps, fps):
+        average_fps = fps
+    # Frames that an even rate would have and the file has not, or the reverse: a phone leaves some
+    # out, also where its rate counts as constant.
+    missing_frames = abs(float(fps) * (reader.shown_s or 0.0) - reader.frame_count)
+    recorded_speed = reader.recorded_rate / float(fps)
+    return StatedRate(
+        fps,
+        average_fps,
+        is_even=reader.counts_frames_alone and missing_frames < _ONE_MISSING,
+        is_counted=reader.is_counted,
+        recorded_speed=recorded_speed if recorded_speed > _SLOW_MOTION else 1.0,
+    )
+
+
+def _rate_notices(footage: str, rate: StatedRate) -> list[Notice]:
+    if not _varies(rate.average_fps, rate.usual_fps):
+        return []
+    found = notice(
+        "variable_frame_rate",
+        footage=footage,
+        rate=float(rate.usual_fps),
+        average=float(rate.average_fps),
+    )
+    return [found]
+
+
+def _sampling_notices(footage: str, fps: Fraction, wanted_fps: Fraction) -> list[Notice]:
+    """Say how frames of footage at a rate are not what was wanted."""
+    found = []
+    sampled_fps = min(wanted_fps, fps)
+    even_fps = fps / round(fps / sampled_fps)
+    rates = {"footage": footage, "rate": float(fps), "wanted": float(wanted_fps)}
+    if _varies(sampled_fps, even_fps):
+        found.append(notice("uneven_frames", **rates, even=float(even_fps)))
+    if wanted_fps > fps:
+        found.append(notice("frame_rate_above_footage", **rates))
+    return found
 
 
 def _varies(average_fps: Fraction, fps: Fraction) -> bool:
@@ -455,7 +477,7 @@ class _Decoder:
         resized = False
         if video.wanted.start_s > 0:
             # Indices have to be those of the whole footage, whichever part is chosen.
-            is_even = video._is_even or video._is_part
+            is_even = video._is_part or video.rate is None or video.rate.is_even
             index, time = reader.skip_to(video.wanted.start_s, video.source_fps, is_even)
         while not self._stop.is_set() and (decoded := reader.read()) is not None:
             time = next_time(time, decoded[0], float(1 / video.source_fps))
@@ -509,7 +531,7 @@ class _Decoder:
         # rate.
         missing = video.frame_count - index
         last = min(float((video.frame_count - 1) / video.average_fps), video.wanted.end_s)
-        if video._is_counted and last - time > _LOST_S:
+        if video.rate is not None and video.rate.is_counted and last - time > _LOST_S:
             return missing > 1
         return missing > max(1, video.frame_count // 50) and time < 0.95 * last
 

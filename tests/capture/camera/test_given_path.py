@@ -13,7 +13,7 @@ import pytest
 from scope.scope_addon.capture.camera.background_record import CameraMotion
 from scope.scope_addon.capture.camera.given_path import read_camera_path
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
-from scope.scope_addon.capture.media.video import Video
+from scope.scope_addon.capture.media.video import StatedRate, Video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.observe import _doubts_about_path, _given_path
 from scope.scope_addon.capture.options import CaptureOptions
@@ -52,8 +52,8 @@ def test_poses_between_those_of_the_file_are_interpolated(tmp_path):
 
 def test_a_path_of_all_frames_is_accepted_where_the_frame_rate_varies(tmp_path):
     """Most frames come at 24 frames/s, but 50 are in a second on average: 40 s, not 83."""
-    video = Video(Path("clip.mp4"), 640, 480, Fraction(24), 50 * 40)
-    video._average_fps = Fraction(50)
+    rate = StatedRate(Fraction(24), average_fps=Fraction(50))
+    video = Video(Path("clip.mp4"), 640, 480, Fraction(24), 50 * 40, rate=rate)
     times_s = np.arange(41.0)
     path = written(tmp_path, times_s=times_s, world_from_camera=true_poses(times_s))
     assert _given_path(video, CaptureOptions(camera_path=path)) is not None

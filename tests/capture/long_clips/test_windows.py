@@ -14,7 +14,7 @@ import av
 import numpy as np
 import pytest
 from scope.scope_addon.capture.long_clips.windows import plan_windows
-from scope.scope_addon.capture.media.video import Video, open_video
+from scope.scope_addon.capture.media.video import StatedRate, Video, open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import WINDOW_S
 
@@ -48,8 +48,8 @@ def test_windows_begin_where_the_range_does() -> None:
 
 def test_windows_are_as_long_where_the_frame_rate_varies() -> None:
     """Most frames come at 30 frames/s, but some so late that there are only 24 in a second."""
-    varying = Video(Path("clip.mp4"), 640, 480, Fraction(30), 24 * 250)
-    varying._average_fps = Fraction(24)
+    rate = StatedRate(Fraction(30), average_fps=Fraction(24))
+    varying = Video(Path("clip.mp4"), 640, 480, Fraction(30), 24 * 250, rate=rate)
     assert [w.begin_s for w in plan_windows(varying, WINDOW_S)] == [0, 120]
 
 
