@@ -6,8 +6,8 @@ clips are skipped.
 can continue. A clip is finished if its content (SHA-256), the options and the program are unchanged
 and its result files have the sizes and SHA-256 that the report says. Clips whose results were
 complete when a batch was killed, before it has written the report, are known by `clips.finished`.
-A folder whose clips would replace results of another folder is refused: the report keeps the
-entries of all folders that were captured there.
+An output folder with the results of another folder is refused: clips of the same names would
+replace each other's.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ...solver.errors import InputError
 from ..atomic_write import complete_file, resolve_link
 from ..clock import Progress
 from ..errors import NO_PERSON, OutputError, UsageError
-from ..footage import FOOTAGE_SUFFIXES, display_text, is_url, json_text, unicode_text
+from ..footage import FOOTAGE_SUFFIXES, display_text, json_text, unicode_text
 from ..temporary import hold, release, remove
 from .clip_runner import LocalRunner, Runner
 from .clip_task import (
@@ -37,7 +37,6 @@ from .clip_task import (
     ClipTask,
     Entry,
     Extras,
-    clip_key,
     find_clips,
     names_of_results,
 )
@@ -47,7 +46,6 @@ from .request import program_version
 REPORT_NAME = "scope-batch.json"
 LOCK_NAME = ".scope-batch.lock"
 STATUSES = ("done", "skipped", "no_person", "failed")
-OTHERS = "other_folders"  # the report's entries of clips of other folders, each with its folder
 # of the time that may be spent on writing the report, which grows with the number of clips
 _WRITING_SHARE = 0.1
 _QUICK_S = 0.1  # a report that is written faster is written after every clip
@@ -88,12 +86,6 @@ class Batch:
         self._basis = self.settings.basis(program_version())
         self._next_report = 0.0
         self._reported: set[str] = set()  # clips of this run that the written report contains
-        self._keys: dict[str, str] = {}  # of clips whose key is known, by name
-        # Entries of results of the same names from the report's folder, which only the clips that
-        # they are of may replace; workers compare the keys, since the footage is not here.
-        self._kept: dict[str, Entry] = {}
-        # Entries of other folders' clips whose names no clip has here.
-        self._others: list[Entry] = []
 
     def clips(self, recursive: bool, views: bool = False) -> dict[str, Path]:
         """Return the clips by the name of their results; see `find_clips`."""
@@ -142,7 +134,7 @@ class Batch:
         :return: the report; its ``exit_status`` is 1 if a clip failed, else 3 if a clip showed no
             person, else 0.
         :raises UsageError: the folder contains no footage, or another batch writes to the output
-            folder, or it has results of the same names from another folder.
+            folder, or it has the results of another folder.
         :raises OutputError: the output folder cannot be created, or the report cannot be written.
         """
         clips = self.clips(recursive, views)
@@ -162,16 +154,14 @@ class Batch:
         with _alone_in(out):
             runner = runner or LocalRunner(self._program, jobs)
             known = self._previous_entries(clips, runner.report().get("folder", str(self.folder)))
-            previous = known
-            if again:
-                previous = {n: e for n, e in known.items() if n in self._kept or n not in clips}
+            previous = {n: e for n, e in known.items() if n not in clips} if again else known
             entries: dict[str, Entry] = {}
             try:
                 # The tasks are made within the try, because a signal can arrive as soon as the
                 # first clip has begun.
                 for finished in runner.outcomes(self._tasks(clips, previous, again)):
                     for name, entry in finished.items():
-                        entries[name] = entry | _what_remains(entry, known.get(name, {}))
+                        entries[name] = entry
                         _print_outcome(entry, f"{len(entries)}/{len(clips)}", say)
                     if finished:
                         self._write_report(_in_order(entries, clips), previous, runner, last=False)
@@ -191,7 +181,7 @@ class Batch:
         for name, path in clips.items():
             file = path.relative_to(self.folder).as_posix()
             entry = None if again else previous.get(name)
-            known = _as_own(entry) if entry and self._is_finished(name, entry) else None
+            known = entry if entry and self._is_finished(name, entry) else None
             yield ClipTask(
                 name,
                 file,
@@ -200,9 +190,7 @@ class Batch:
                 self._basis,
                 self.settings,
                 known,
-                key=self._keys.get(name, ""),
                 again=again,
-                only_key=self._kept.get(name, {}).get("key", ""),
             )
 
     def _is_finished(self, name: str, entry: Entry) -> bool:
@@ -226,56 +214,34 @@ class Batch:
 
     def _previous_entries(self, clips: dict[str, Path], folder: str) -> dict[str, Entry]:
         """Return the entries of the previous report by name; empty if the report is missing or
-        damaged. Of other folders, only entries of clips that are here, too, as after the folder was
-        renamed. Where the footage is at a URL, they are kept for the workers to compare.
+        damaged.
 
         :param folder: of the footage, as the report has it.
         :raises OutputError: what has its name is no file, so that no report could be written.
-        :raises UsageError: a clip has the name of another folder's results.
+        :raises UsageError: the report is of another folder.
         """
         resolve_link(self.report_file)
-        own, others = self._read_entries(clips, folder)
-        self._others = [e for name, e in others.items() if name not in clips]
-        shared = {name: e for name, e in others.items() if name in clips and e.get("outputs")}
-        if is_url(folder):
-            self._kept = {n: e for n, e in shared.items() if isinstance(e.get("key"), str)}
-            return own | shared
-        for name, entry in shared.items():
-            with suppress(OSError):  # what cannot be read replaces nothing
-                key = clip_key(self._basis, clips[name], RATE in self.settings.options)
-                self._keys[name] = key
-                if entry.get("key") != key:
-                    raise UsageError(
-                        f"'{display_text(name)}' of {folder} would replace the result of the same "
-                        f"name of {display_text(entry['folder'])}; give another --out, or remove "
-                        f"{self.report_file} if it may be replaced"
-                    )
-        return own | {name: _as_own(e) for name, e in shared.items()}
-
-    def _read_entries(
-        self, clips: dict[str, Path], folder: str
-    ) -> tuple[dict[str, Entry], dict[str, Entry]]:
-        """Return the entries of the previous report by name: those of this folder, and those of
-        others, each with its folder.
-        """
+        of_clips = {unicode_text(name): name for name in clips}
         try:
             report = json.loads(self.report_file.read_text(encoding="utf-8"))
-            of_clips = {unicode_text(name): name for name in clips}
             entries = {
-                of_clips.get(e["name"], e["name"]): {"folder": report["folder"]} | e
-                for e in [*report["files"], *report.get(OTHERS, [])]
+                of_clips.get(e["name"], e["name"]): e
+                for e in report["files"]
                 if isinstance(e["status"], str)
             }
-            ours = {
-                each
-                for each in {e["folder"] for e in entries.values()}
-                if unicode_text(folder) == each
-                or unicode_text(self.folder) == str(Path(each).resolve())
-            }
+            before = report["folder"]
+            is_same = unicode_text(folder) == before or unicode_text(self.folder) == str(
+                Path(before).resolve()
+            )
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
-            return {}, {}
-        own = {name: _as_own(e) for name, e in entries.items() if e["folder"] in ours}
-        return own, {name: e for name, e in entries.items() if name not in own}
+            return {}
+        if entries and not is_same:
+            raise UsageError(
+                f"the folder of --out has the results of {display_text(before)}; give another for "
+                f"those of {display_text(folder)}, or, if it is the same folder under a new name, "
+                f"write that name into {REPORT_NAME} there"
+            )
+        return entries
 
     def _write_report(
         self, entries: dict[str, Entry], previous: dict[str, Entry], runner: Runner, *, last: bool
@@ -298,7 +264,6 @@ class Batch:
                 ({n: e for n, e in previous.items() if n not in entries} | entries).values()
             ),
             "exit_status": status,
-            **({OTHERS: self._others} if self._others else {}),
             **runner.report(),
         }
         try:
@@ -352,21 +317,6 @@ def _alone_in(out: Path) -> Iterator[None]:
         yield
     finally:
         release(lock)
-
-
-def _what_remains(entry: Entry, before: Entry) -> Entry:
-    """Return what the report keeps of earlier results, which a clip that failed did not replace:
-    another folder's clips may not replace them either, so that their key has to be known.
-
-    :param before: the entry of the results.
-    """
-    fields = ("key", "outputs", "content", "folder") if entry["status"] == "failed" else ()
-    return {field: before[field] for field in fields if field in before}
-
-
-def _as_own(entry: Entry) -> Entry:
-    """Return an entry as one of the report's own folder."""
-    return {field: value for field, value in entry.items() if field != "folder"}
 
 
 def _in_order(entries: dict[str, Entry], clips: dict[str, Path]) -> dict[str, Entry]:

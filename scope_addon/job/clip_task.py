@@ -129,8 +129,6 @@ class ClipTask(NamedTuple):
     :param windows_folder: of a clip that is captured, with windows that were observed before.
     :param key: of the clip, if it is known.
     :param again: capture the clip even if its results are there.
-    :param only_key: of the clip whose results, from another folder, have this name: another one may
-        not replace them; empty if there are none.
     """
 
     name: str
@@ -146,7 +144,6 @@ class ClipTask(NamedTuple):
     windows_folder: str = ""
     key: str = ""
     again: bool = False
-    only_key: str = ""
 
 
 def capture_clip(
@@ -170,12 +167,6 @@ def capture_clip(
     except OSError as error:
         return failure(task, f"{footage} cannot be read: {error.strerror}")
     entry: Entry = {"file": task.file, "name": task.name, "key": key}
-    if task.only_key not in ("", key):
-        return failure(
-            task,
-            "it would replace the result of the same name of another folder; give another --out, "
-            "or remove the report there if that may be replaced",
-        )
     # On a cluster, results are moved when they are finished.
     leaves_record = not task.final and not task.windows
     record = finished_file(out, task.name, key) if leaves_record else None

@@ -144,40 +144,33 @@ def test_finished_clips_are_skipped_and_changed_ones_captured(folder, tmp_path):
     assert calls(folder) == ["a.mp4", "b.mov", "c.png", "e.webm"]
 
 
-def test_results_of_another_folder_are_kept(folder, tmp_path):
-    """The cameras' cards name their clips alike. A folder that was renamed continues."""
-    for name in ("b.mov", "c.png", "d.avi"):
-        (folder / name).unlink()
+@pytest.mark.parametrize("again", [False, True])
+def test_a_folder_with_the_results_of_another_is_refused(tmp_path, again):
+    """The cameras' cards name their clips alike. A folder that was renamed can continue."""
+    day, other = tmp_path / "day", tmp_path / "other"
+    for each in (day, other):
+        each.mkdir()
+        (each / "a.mp4").write_text(each.name)
     out = tmp_path / "out"
-    batch(folder, out).run(1)
-    renamed = folder.rename(tmp_path / "renamed")
-    assert batch(renamed, out).run(1)["counts"]["skipped"] == 2
-    other = tmp_path / "other"
-    other.mkdir()
-    (other / "a.mp4").write_text("another day")
-    for again in (False, True):
-        with pytest.raises(
-            UsageError, match=f"'a' of {literal(other)} .* name of {literal(renamed)}; .* --out"
-        ):
-            batch(other, out).run(1, again=again)
-    assert (out / "a.npz").read_text() == "result of ok"
-    (other / "a.mp4").rename(other / "f.mp4")
-    assert [entry["name"] for entry in batch(other, out).run(1)["files"]] == ["f"]
+    batch(day, out).run(1)
+    (day / "b.mp4").write_text("broken")
+    batch(day, out, {"--quality": "fast"}).run(1)
+    refused = f"{literal(day)}; give another for those of {literal(other)}, .* {REPORT_NAME}"
+    with pytest.raises(UsageError, match=refused):
+        batch(other, out).run(1, again=again)
+    assert (out / "a.npz").read_text() == "result of day"
+    assert calls_so_far(other) == []
 
-    third = tmp_path / "third"
-    third.mkdir()
-    (third / "f.mp4").write_text("a third day")
-    for name, text, first in (("a", "ok", renamed), ("f", "another day", other)):
-        (third / "f.mp4").rename(third / f"{name}.mp4")
-        with pytest.raises(
-            UsageError, match=f"'{name}' of {literal(third)} .* name of {literal(first)}; .* --out"
-        ):
-            batch(third, out).run(1)
-        assert (out / f"{name}.npz").read_text() == f"result of {text}"
-        (third / f"{name}.mp4").rename(third / "f.mp4")
+    renamed = day.rename(tmp_path / "renamed")
     calls(renamed)
-    assert batch(renamed, out).run(1)["counts"]["skipped"] == 2
-    assert calls(renamed) == []
+    with pytest.raises(UsageError, match=f"{literal(day)}; .* {literal(renamed)}, "):
+        batch(renamed, out).run(1)
+    report = (out / REPORT_NAME).read_text("utf-8")
+    (out / REPORT_NAME).write_text(
+        report.replace(json.dumps(str(day)), json.dumps(str(renamed))), "utf-8"
+    )
+    assert batch(renamed, out, {"--quality": "fast"}).run(1)["counts"]["skipped"] == 1
+    assert calls(renamed) == ["b.mp4"]
 
 
 def test_of_two_batches_at_once_in_one_folder_the_second_is_refused(tmp_path):
@@ -210,29 +203,6 @@ def test_a_batch_runs_where_all_files_are_another_users(folder, tmp_path, monkey
     assert not (out / LOCK_NAME).exists()
 
 
-@pytest.mark.parametrize("later", ["fails", "is gone"])
-def test_results_of_another_folder_are_kept_after_a_later_run(tmp_path, later):
-    """A run of the same folder that has not replaced them."""
-    clips, other = tmp_path / "clips", tmp_path / "other"
-    for each in (clips, other):
-        each.mkdir()
-    out = tmp_path / "out"
-    (clips / "a.mp4").write_text("ok")
-    (clips / "b.mp4").write_text("ok")
-    batch(clips, out).run(1)
-    if later == "fails":
-        (clips / "a.mp4").write_text("broken")
-    else:
-        (clips / "a.mp4").unlink()
-    batch(clips, out).run(1, again=True)
-    (other / "a.mp4").write_text("another day")
-    with pytest.raises(
-        UsageError, match=f"'a' of {literal(other)} .* name of {literal(clips)}; .* --out"
-    ):
-        batch(other, out).run(1)
-    assert (out / "a.npz").read_text() == "result of ok"
-
-
 class StoreRunner(LocalRunner):
     """Captures footage of a store, which the batch has the names of."""
 
@@ -250,7 +220,8 @@ class StoreRunner(LocalRunner):
         return {"folder": self.url}
 
 
-def test_a_folder_of_a_store_continues_after_it_was_renamed_and_keeps_results_of_another(tmp_path):
+@pytest.mark.parametrize("again", [False, True])
+def test_results_of_another_folder_of_a_store_are_kept(tmp_path, again):
     out = tmp_path / "out"
     names = tmp_path / "names"
     store = tmp_path / "store"
@@ -262,15 +233,13 @@ def test_a_folder_of_a_store_continues_after_it_was_renamed_and_keeps_results_of
         (store / "a.mp4").write_text(text)
         runner = StoreRunner(store, f"memory://{url}")
         (entry,) = batch(names, out).run(1, again=again, runner=runner)["files"]
-        assert (out / "a.npz").read_text() == "result of day"
         return entry["status"]
 
     assert run("day", "day") == "done"
-    assert run("renamed", "day") == "skipped"
-    for again in (False, True, False):
-        assert run("other", "another day", again) == "failed"
-    assert run("renamed", "day") == "done"
-    assert run("moved", "day", again=True) == "done"
+    with pytest.raises(UsageError, match=r"memory://day; give another for those of memory://other"):
+        run("other", "another day", again)
+    assert (out / "a.npz").read_text() == "result of day"
+    assert run("day", "day") == "skipped"
 
 
 NAMES = b"caf\xe8.mp4", b"caf\xe9.mp4", "caf\ufffd.mp4".encode(), b"a.mp4"
