@@ -117,33 +117,14 @@ class BackgroundTracker:
             self._box(bar) for bar in self.bars
         ]
         self._corners.add(row, time_s, image, boxes, is_cut, is_shared)
-        if self._image is None:
-            self._begin_key(image, boxes)
-            self._rotations.append(np.eye(3))
-            return
-        R_camera_key = None if is_cut else self._follow(image, boxes)
-        # A cut, or too few corners: start again at the last known rotation.
-        if R_camera_key is None:
-            if self.edge_frames:  # what is seen from now on may be something else
-                self._hidden.reveal([])
-            self._begin_key(image, boxes)
-            self._rotations.append(None)
-            return
-        self._R_key_last = R_camera_key.T
-        R_first_camera = self._R_first_key @ self._R_key_last
+        R_first_camera = self._rotation(image, boxes, is_cut)
         self._rotations.append(R_first_camera)
-        if self.edge_frames and self._seconds_since(self.edge_frames[-1]) >= EDGE_INTERVAL_S:
-            if is_rotated(R_first_camera):
-                segments = find_segments(image_rgb, people, EDGE_SIDE_PX, self.bars)
-                self.edge_frames.append(FrameEdges(row, segments))
-            elif self._reveal_edges(people):
-                segments = find_segments(image_rgb, people, bars=self.bars)
-                was_hidden = self._hidden.hides(segments.ends_px.mean(axis=1))
-                self.edge_frames.append(FrameEdges(row, segments.where(was_hidden)))
-                self._hidden.reveal(people)
-        self._image = image
-        if len(self._points) < max(KEY_SHARE * self._key_count, MIN_CORNERS):
-            self._begin_key(image, boxes)
+        if not self.edge_frames:
+            return
+        if R_first_camera is None:  # what is seen from now on may be something else
+            self._hidden.reveal([])
+        elif self._seconds_since(self.edge_frames[-1]) >= EDGE_INTERVAL_S:
+            self._add_edges(image_rgb, people, R_first_camera)
 
     def record(self) -> BackgroundRecord:
         """Return what is known of the frames so far."""
@@ -167,6 +148,43 @@ class BackgroundTracker:
         if not people or self._seconds_since(self.edge_frames[0]) > REVEALING_S:
             return False
         return self._hidden.share_in_view(people) >= REVEALED_SHARE
+
+    def _add_edges(
+        self, image_rgb: Uint8Array, people: Sequence[NDArray[Any]], R_first_camera: Float64Array
+    ) -> None:
+        """Detect the last frame's edges that are new: all of a camera that has rotated, and
+        otherwise those that people hid so far.
+        """
+        row = len(self._times) - 1
+        if is_rotated(R_first_camera):
+            segments = find_segments(image_rgb, people, EDGE_SIDE_PX, self.bars)
+            self.edge_frames.append(FrameEdges(row, segments))
+        elif self._reveal_edges(people):
+            segments = find_segments(image_rgb, people, bars=self.bars)
+            was_hidden = self._hidden.hides(segments.ends_px.mean(axis=1))
+            self.edge_frames.append(FrameEdges(row, segments.where(was_hidden)))
+            self._hidden.reveal(people)
+
+    def _rotation(
+        self, image: Uint8Array, boxes: Sequence[Float64Array], is_cut: bool
+    ) -> Float64Array | None:
+        """Return the rotation (3, 3) from the next working image's axes to those of the first, or
+        None if it is unknown; begin a key frame where one is needed.
+        """
+        if self._image is None:
+            self._begin_key(image, boxes)
+            return np.eye(3)
+        R_camera_key = None if is_cut else self._follow(image, boxes)
+        # A cut, or too few corners: start again at the last known rotation.
+        if R_camera_key is None:
+            self._begin_key(image, boxes)
+            return None
+        self._R_key_last = R_camera_key.T
+        R_first_camera = self._R_first_key @ self._R_key_last
+        self._image = image
+        if len(self._points) < max(KEY_SHARE * self._key_count, MIN_CORNERS):
+            self._begin_key(image, boxes)
+        return R_first_camera
 
     def _follow(self, image: Uint8Array, boxes: Sequence[Float64Array]) -> Float64Array | None:
         """Return the rotation (3, 3) from the key frame's axes to the current camera's, or None if
