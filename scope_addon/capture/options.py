@@ -18,7 +18,7 @@ from ..options import Place, option, options_at
 from ..options.capture import ALL, AUTO, LARGEST, OFF, CaptureDeclaration, NetworkDeclaration
 from .camera.calibration import Calibration, read_calibration
 from .camera.given_path import read_camera_path
-from .camera.intrinsics import choose_camera
+from .camera.intrinsics import check_lens
 from .fitting.hand_measurements import require_fingers
 from .fitting.stature import require_stature
 from .media.video_range import FootageRange, Timecode, VideoRange, parse_range, parse_time
@@ -59,7 +59,7 @@ def capture_options(values: Mapping[str, Any]) -> CaptureOptions:
         be parsed, or the end does not come after the start.
     """
     fields: dict[str, Any] = {}
-    for each in options_at(Place.CAPTURE | Place.WORKER):
+    for each in options_at(Place.CAPTURE):
         value = values[each.name]
         fields[each.name] = Path(value) if each.value_type is Path and value is not None else value
     view = FootageView(int(values["rotate"]), values["mirror"])
@@ -124,18 +124,8 @@ def check_options(body: Body, options: CaptureOptions, has_views: bool = False) 
         require_fingers(body)
     for height_m in options.heights_m:
         require_stature(body, height_m)
-    if options.focal_mm is not None or options.fov_deg is not None:
-        choose_camera(
-            1,
-            1,
-            focal_mm=options.focal_mm,
-            fov_deg=options.fov_deg,
-            calibration=options.calibration,
-            camera_path=options.camera_path,
-        )
-    elif options.calibration and options.camera_path:
-        raise UsageError("--calibration and --camera-path contradict each other: give one of them")
-    elif options.calibration and not has_views:
+    check_lens(options.focal_mm, options.fov_deg, options.calibration, options.camera_path)
+    if options.calibration and not has_views:
         read_calibration(options.calibration)
     if options.offsets_s and not has_views:
         raise UsageError("--offset is for several cameras, but one video was given")

@@ -301,18 +301,11 @@ def _checked(values: Mapping[str, Any]) -> LiveOptions:
             f"{len(values['heights_m'])} heights are given, but --people is {values['live_people']}"
         )
     from ..capture.camera.calibration import read_calibration
-    from ..capture.camera.intrinsics import choose_camera
+    from ..capture.camera.intrinsics import check_lens
     from ..live.run import LiveOptions
 
-    if values["focal_mm"] is not None or values["fov_deg"] is not None:
-        choose_camera(
-            1,
-            1,
-            focal_mm=values["focal_mm"],
-            fov_deg=values["fov_deg"],
-            calibration=values["calibration"],
-        )
-    elif values["calibration"]:
+    check_lens(values["focal_mm"], values["fov_deg"], values["calibration"])
+    if values["calibration"]:
         read_calibration(values["calibration"])
     return LiveOptions.of(values)
 

@@ -132,15 +132,7 @@ def choose_camera(
     :raises InputError: the calibration, or that of the path, cannot be used for footage of this
         size.
     """
-    options = {
-        "--focal-mm": focal_mm,
-        "--fov": fov_deg,
-        "--calibration": calibration,
-        "--camera-path": camera_path,
-    }
-    given = [name for name, value in options.items() if value is not None]
-    if len(given) > 1:
-        raise UsageError(f"{' and '.join(given)} contradict each other: give one of them")
+    check_lens(focal_mm, fov_deg, calibration, camera_path)
     longer = max(width, height)
     lens = _lens_of_file(calibration, camera_path)
     if lens is not None:
@@ -152,19 +144,9 @@ def choose_camera(
             source,
         )
     if focal_mm is not None:
-        if not 1.0 <= focal_mm <= 2000.0:
-            raise UsageError(
-                f"--focal-mm {focal_mm:g} is not a focal length: give 35 mm "
-                "equivalent ones, such as 26"
-            )
         focal_px = focal_mm / FILM_WIDTH_MM * longer
         source = f"given, {focal_mm:g} mm"
     elif fov_deg is not None:
-        if not 1.0 <= fov_deg <= 175.0:
-            raise UsageError(
-                f"--fov {fov_deg:g} is not a field of view: give degrees along the longer side, "
-                "such as 60"
-            )
         focal_px = _focal_from_fov(longer, fov_deg)
         source = f"given, {fov_deg:g} degrees"
     elif metadata_focal_mm:
@@ -173,6 +155,36 @@ def choose_camera(
     else:
         return assumed_camera(width, height, (width, height))
     return Camera(pinhole(width, height, focal_px), np.zeros(5), source, is_by_side=True)
+
+
+def check_lens(
+    focal_mm: float | None,
+    fov_deg: float | None,
+    calibration: Calibration | str | Path | None,
+    camera_path: Path | None = None,
+) -> None:
+    """Check what the user says of the lens, as of `choose_camera`, without reading files.
+
+    :raises UsageError: the values contradict each other, or one is impossible.
+    """
+    options = {
+        "--focal-mm": focal_mm,
+        "--fov": fov_deg,
+        "--calibration": calibration,
+        "--camera-path": camera_path,
+    }
+    given = [name for name, value in options.items() if value is not None]
+    if len(given) > 1:
+        raise UsageError(f"{' and '.join(given)} contradict each other: give one of them")
+    if focal_mm is not None and not 1.0 <= focal_mm <= 2000.0:
+        raise UsageError(
+            f"--focal-mm {focal_mm:g} is not a focal length: give 35 mm equivalent ones, such as 26"
+        )
+    if fov_deg is not None and not 1.0 <= fov_deg <= 175.0:
+        raise UsageError(
+            f"--fov {fov_deg:g} is not a field of view: give degrees along the longer side, such "
+            "as 60"
+        )
 
 
 def _lens_of_file(
