@@ -27,6 +27,7 @@ import numpy as np
 from ..solver.names import BODY_JOINTS
 from .arrays import BoolArray, Float32Array, Float64Array, unit_vectors
 from .motion import Motion
+from .scene_gaps import usual_step_s
 
 # reprojection error above which a frame should be reviewed, as a share of the image's longer side
 FAR_SHARE = 0.03
@@ -173,7 +174,7 @@ def has_bent_knees(motion: Motion) -> bool:
         straightest = np.maximum(straightest, np.degrees(np.arccos(np.clip(cosine, -1, 1))))
         is_upright = hip[:, 2] - ankle[:, 2] > STANDING * (thigh + shank)
         stands |= is_upright & motion.valid
-    period = float(np.median(np.diff(motion.timestamps))) if len(motion) > 1 else 0.0
+    period = usual_step_s(motion.timestamps)
     if stands.sum() * period < BENT_S or stands.sum() < 0.5 * motion.valid.sum():
         return False
     return bool(np.percentile(straightest[stands], 98) < BENT_KNEE_DEG)

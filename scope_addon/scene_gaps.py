@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gaps that are put into the times of frames at scene cuts, so that nothing is filtered, measured
-or interpolated across a cut.
+"""Steps between the times of frames, and the gaps that are put into them at scene cuts, so that
+nothing is filtered, measured or interpolated across a cut.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Float64Array
+from .arrays import Float64Array, FloatArray
 
 SCENE_GAP_S = 10.0  # longer than any filter reaches
 
@@ -30,6 +32,15 @@ def with_scene_gaps(
     :param cuts_s: (M,) seconds, in order, from `cut_times`.
     """
     return times + gap_s * np.searchsorted(cuts_s, times)
+
+
+def usual_step_s(times: FloatArray | Sequence[float], alone: float = 0.0) -> float:
+    """Return the seconds from most frames to the next.
+
+    :param times: (T,) seconds.
+    :param alone: what to return for a single frame, or none.
+    """
+    return float(np.median(np.diff(times))) if len(times) > 1 else alone
 
 
 def steps_in_scenes(times: Float64Array) -> Float64Array:

@@ -24,6 +24,7 @@ from ..kinematics.smoothing import (
     smooth_rotations,
 )
 from ..motion import Motion
+from ..scene_gaps import usual_step_s
 
 _HEADING_CUTOFF_HZ = 1.0  # Low enough to remove the rotation of the hips with each step.
 
@@ -135,7 +136,7 @@ def band_limited(clip: Clip, rate: float) -> Clip:
 
     Without the filter, oscillations faster than the new rate would alias into slow motion.
     """
-    step = np.median(np.diff(clip.times)) if len(clip) > 1 else 1.0 / rate
+    step = usual_step_s(clip.times, alone=1.0 / rate)
     if 1.0 / rate <= 1.5 * step:
         return clip
     return Clip(clip.times, smooth_rotations(clip.rotations, clip.times, 0.45 * rate), clip.root)

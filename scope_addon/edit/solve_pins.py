@@ -30,7 +30,7 @@ from ..arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ..kinematics.axes import UP, transposed
 from ..kinematics.contact_points import FOOT_PARTS, SOLES
 from ..kinematics.standing import standing_probability
-from ..scene_gaps import with_scene_gaps
+from ..scene_gaps import usual_step_s, with_scene_gaps
 from .clip import Clip, sample
 from .corrections import FEET, Contact, Pin
 from .pose_refit import (
@@ -413,7 +413,7 @@ def _span_within_reach(clip: Clip, keys: list[int], reach: Float64Array) -> Inde
 def _key_at(clip: Clip, time: float) -> int | None:
     """Return the key nearest to a time; None where the clip has none near."""
     key = int(np.abs(clip.times - time).argmin())
-    spacing = float(np.median(np.diff(clip.times))) if len(clip) > 1 else 0.1
+    spacing = usual_step_s(clip.times, alone=0.1)
     return key if abs(clip.times[key] - time) <= max(spacing, 0.05) else None
 
 
@@ -421,7 +421,7 @@ def keys_of_span(clip: Clip, first: int, last: int, shot: Shot) -> IndexArray:
     """Return the indices of a clip's keys at the source frames from ``first`` to ``last``, both
     inclusive: those up to half of a step away from them, and nearer to them than to other frames.
     """
-    half = 0.5 * float(np.median(np.diff(shot.times))) if len(shot.times) > 1 else 0.01
+    half = 0.5 * usual_step_s(shot.times, alone=0.01)
     begin = shot.time(first)
     end = shot.time(last)
     earlier = shot.times[shot.frames < first]

@@ -17,6 +17,7 @@ from ...solver.body import Body
 from ...solver.rotations import exp
 from ..arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ..motion import Motion
+from ..scene_gaps import usual_step_s
 from .axes import UP
 from .contact_points import FOOT_PARTS, with_points_on_parts
 from .frame_blocks import by_blocks
@@ -193,7 +194,7 @@ def _rests(mask: BoolArray, times: Float64Array) -> list[tuple[int, int]]:
 
 def _duration(mask: BoolArray, times: Float64Array) -> float:
     """Return the seconds for which ``mask`` (T,) is True, of frames at ``times`` (T,)."""
-    return float(mask.sum() * np.median(np.diff(times))) if len(times) > 1 else 0.0
+    return float(mask.sum() * usual_step_s(times))
 
 
 def _directions() -> Float64Array:

@@ -44,6 +44,7 @@ from ..kinematics.leg_reach import cross, knee_turn
 from ..kinematics.sequences import runs
 from ..kinematics.smoothing import fill_gaps, gaussian_smooth
 from ..kinematics.standing import standing_probability
+from ..scene_gaps import usual_step_s
 from .rest_pose import Pose, Skeleton, head_positions
 
 # Thickness of the sole, and length of the heel region.
@@ -469,7 +470,7 @@ def pelvis_drop(
         return needed
     # A maximum filter, then a weighted mean of the same width: nowhere less than needed, and
     # smooth.
-    frames = round(_DROP_S / float(np.median(np.diff(times))))
+    frames = round(_DROP_S / usual_step_s(times))
     width = np.arange(-frames, frames + 1)
     near = np.clip(np.arange(len(needed))[:, None] + width, 0, len(needed) - 1)
     weight = 1 + np.cos(np.pi * width / (frames + 1))

@@ -9,6 +9,7 @@ import numpy as np
 
 from ....solver import Body, MotionPrior, Options, Stage, Weights
 from ...arrays import Float64Array
+from ...scene_gaps import usual_step_s
 
 # Inverse variances: 5 px at a focal length of 1600 px (0.003 in normalized coordinates) for 2D
 # keypoints, 0.35 m for the depth of 3D keypoints to which the lifter gives 0.1 m (its errors are
@@ -144,7 +145,7 @@ def motion_priors(body: Body, times: Float64Array) -> tuple[MotionPrior, MotionP
 
     :param times: (T,) seconds.
     """
-    rate = 1.0 / (_RATE_HZ * float(np.median(np.diff(times)))) if len(times) > 1 else 1.0
+    rate = 1.0 / (_RATE_HZ * usual_step_s(times, alone=1.0 / _RATE_HZ))
     scale = _ACCELERATION * min(rate * rate, rate)
     names = body.joint_names[1:]
     of_fingers = _USUAL["hand"]

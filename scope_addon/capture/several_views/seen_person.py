@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
+from ...scene_gaps import usual_step_s
 from ..camera.intrinsics import Camera
 from ..fitting.frame_measurements import place
 from ..fitting.prepared_track import PreparedTrack
@@ -73,8 +74,7 @@ class Between:
         after = np.minimum(after, len(own) - 1)
         gap = own[after] - own[before]
         share = (times - own[before]) / np.maximum(gap, 1e-9)
-        usual_s = float(np.median(np.diff(own))) if len(own) > 1 else 0.0
-        longest_s = max(LONGEST_GAP_S, LONGEST_GAP * usual_s)
+        longest_s = max(LONGEST_GAP_S, LONGEST_GAP * usual_step_s(own))
         both: BoolArray = seen[before] & seen[after] & (gap <= longest_s)
         both &= (share >= -1e-9) & (share <= 1 + 1e-9)
         return cls(before, after, np.clip(share, 0.0, 1.0), both)

@@ -14,6 +14,7 @@ from ...arrays import BoolArray, Float64Array, FloatArray, unit_vectors
 from ...kinematics.face import EXPRESSIONS
 from ...kinematics.smoothing import gaussian_smooth
 from ...motion import FACE_KEYS
+from ...scene_gaps import usual_step_s
 from ..perception.face_record import CONTOURS, eye_light_of, noise_of_size, parts
 
 CALM_HZ = 2.0  # cut-off frequency at rest
@@ -101,7 +102,7 @@ def with_open_eyes(weights: FloatArray, seen: BoolArray, times: Float64Array) ->
     :param seen: (T,) where the face was seen.
     :param times: (T,) seconds.
     """
-    if len(times) < 2 or seen.sum() * float(np.median(np.diff(times))) < MIN_S:
+    if len(times) < 2 or seen.sum() * usual_step_s(times) < MIN_S:
         return weights
     out = weights.copy()
     for blink in _BLINKS:

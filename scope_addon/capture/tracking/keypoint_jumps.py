@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...arrays import BoolArray, Float64Array, FloatArray
+from ...scene_gaps import usual_step_s
 from ..perception.lifter import person_size
 from .track import Track
 
@@ -71,7 +72,7 @@ def find_keypoint_jumps(points: FloatArray, seen: BoolArray, times: Float64Array
     jumps = np.zeros((T, J), bool)
     if T < 3:
         return jumps
-    step_s = _usual_step_s(times)
+    step_s = max(usual_step_s(times), 1e-6)
     place = _places(times)
     for n in range(1, min(MAX_JUMP_FRAMES, T - 2) + 1):
         starts = place[: T - n - 1]
@@ -97,16 +98,11 @@ def find_keypoint_jumps(points: FloatArray, seen: BoolArray, times: Float64Array
     return jumps
 
 
-def _usual_step_s(times: Float64Array) -> float:
-    """Return the time from most frames (T,) to the next, T > 1."""
-    return max(float(np.median(np.diff(times))), 1e-6)
-
-
 def _places(times: Float64Array) -> Float64Array:
     """Return when each of the frames (T,) is shown, in usual steps after the first one: their
     numbers at a constant frame rate, however the container rounds times.
     """
-    usual_s = _usual_step_s(times)
+    usual_s = max(usual_step_s(times), 1e-6)
     steps_s = np.diff(times)
     is_usual = np.abs(steps_s - usual_s) <= max(_SAME_STEP * usual_s, _SAME_STEP_S)
     steps = np.where(is_usual, 1.0, np.maximum(steps_s / usual_s, 1e-6))

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Float64Array
+from ...scene_gaps import usual_step_s
 from .appearance import distance
 from .track import Tracklet
 
@@ -282,7 +283,7 @@ def _plausible(people: list[list[Tracklet]], times: Sequence[float]) -> list[lis
     ]
     longest = [max(times[t.rows[-1]] - times[t.rows[0]] for t in person) for person in frequent]
     least = min(MIN_INTERVAL_S, 0.5 * (times[-1] - times[0]))
-    if max(longest, default=0.0) < least and np.median(np.diff(times)) >= MIN_INTERVAL_S:
+    if max(longest, default=0.0) < least and usual_step_s(times) >= MIN_INTERVAL_S:
         least = 0.0
     return [person for person, s in zip(frequent, longest, strict=True) if s >= least]
 
@@ -311,7 +312,7 @@ def _frames_in(seconds: float, times: Sequence[float]) -> float:
     """Return how many frames a clip has in a time, by its usual rate; inf for a single frame."""
     if len(times) < 2:
         return np.inf
-    return seconds / max(float(np.median(np.diff(times))), 1e-6)
+    return seconds / max(usual_step_s(times), 1e-6)
 
 
 def frames_before_merger(
@@ -375,7 +376,7 @@ def without_glimpses(tracklets: Sequence[Tracklet], times: Sequence[float]) -> l
     """
     begins = {tracklet.rows[0] for tracklet in tracklets if tracklet.rows}
     ends = {tracklet.rows[-1] for tracklet in tracklets if tracklet.rows}
-    step_s = float(np.median(np.diff(times))) if len(times) > 1 else MIN_REAPPEARANCE_S
+    step_s = usual_step_s(times, alone=MIN_REAPPEARANCE_S)
     kept = []
     for tracklet in tracklets:
         if not tracklet.rows:

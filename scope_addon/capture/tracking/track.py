@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray
+from ...scene_gaps import usual_step_s
 from ..camera.intrinsics import Camera
 from ..perception.face_record import RECORD
 from ..perception.landmark_network import KEYPOINT_COUNT, TRUNK
@@ -62,7 +63,7 @@ class Track:
     @property
     def step_s(self) -> float:
         """The usual time from one frame to the next, 0 for a single frame."""
-        return float(np.median(np.diff(self.times))) if len(self) > 1 else 0.0
+        return usual_step_s(self.times)
 
     @property
     def has_depth(self) -> bool:

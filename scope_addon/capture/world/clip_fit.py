@@ -34,6 +34,7 @@ from ...clock import Progress
 from ...kinematics.body_surface import BodySurface
 from ...kinematics.mirrored_limbs import LIMBS, bone_depths, mirrored_limb, runs_of_one_sign
 from ...kinematics.smoothing import interpolate_rotations
+from ...scene_gaps import usual_step_s
 from ..fitting.frame_sequence import LONGEST_COAST_S, FittedTrack, rotations_of
 from ..fitting.prepared_track import PreparedTrack
 from ..fitting.weights import motion_priors
@@ -161,8 +162,8 @@ def frames_between_gaps(valid: BoolArray, times: Float64Array) -> Iterator[Index
     """
     frames = np.flatnonzero(valid)
     if len(frames):
-        usual = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-        gaps = np.diff(times[frames]) > max(LONGEST_COAST_S, LONGEST_STEP * usual)
+        longest_s = max(LONGEST_COAST_S, LONGEST_STEP * usual_step_s(times))
+        gaps = np.diff(times[frames]) > longest_s
         yield from np.split(frames, np.flatnonzero(gaps) + 1)
 
 
@@ -210,7 +211,7 @@ def joint_sigma(
     sight = unit_vectors(joints)
     along = np.einsum("tki,tkij,tkj->tk", sight, covariance, sight)
     across = 0.5 * (np.trace(covariance, axis1=-2, axis2=-1) - along)
-    rate = 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else _MIN_HZ
+    rate = 1.0 / usual_step_s(times, alone=1.0 / _MIN_HZ)
     inflation = (max(rate, _MIN_HZ) / _RATE_HZ) ** _EXPONENT
     variance = np.maximum(np.stack([along, across], axis=-1), 0.0)
     return inflation * np.sqrt(variance) * [ALONG, ACROSS]

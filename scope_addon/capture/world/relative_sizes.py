@@ -21,6 +21,7 @@ import numpy as np
 
 from ...arrays import Float64Array, FloatArray
 from ...kinematics.contact_points import SOLES
+from ...scene_gaps import usual_step_s
 from .placement import PlacedTrack
 from .world_frame import floor_height
 
@@ -108,7 +109,7 @@ def stander(placed: PlacedTrack, up: FloatArray, is_known: bool) -> Stander:
     contact = placed.contact(up)[valid, : len(SOLES)]
     height_m = -floor_height(placed.soles[valid], contact, up)
     if len(placed.times) > 1:
-        step_s = float(np.median(np.diff(placed.times)))
+        step_s = usual_step_s(placed.times)
         if contact.max(axis=1).sum() * step_s < MIN_CONTACT_S:
             height_m = float("nan")
     return Stander(height_m, stature_m, is_known)

@@ -38,6 +38,7 @@ from ...edit.solve_pins import Shot, missed, resolve
 from ...errors import UsageError
 from ...kinematics.axes import UP, rotated, transform_points, transposed
 from ...motion import Motion
+from ...scene_gaps import usual_step_s
 from ..actions import fcurves, read_keys
 from ..stored_values import smoothing_of, start_frame
 from ..timing import cycle_span
@@ -273,8 +274,7 @@ def _nearest_rows(motion: Motion, times: Float64Array) -> IndexArray:
 
 def _longest_shown(motion: Motion, rate: float) -> float:
     """Return for how many seconds around its time a frame of the footage counts as shown."""
-    spacing = float(np.median(np.diff(motion.timestamps))) if len(motion) > 1 else 1.0 / rate
-    return max(spacing, 1.0 / rate)
+    return max(usual_step_s(motion.timestamps), 1.0 / rate)
 
 
 def check_times_of_keys(armature: Object, motion: Motion, rate: float) -> None:

@@ -30,6 +30,7 @@ from ...footage import display_text
 from ...kinematics.axes import R_OPENSIM_MODEL, R_OPENSIM_WORLD, transposed
 from ...motion import Motion
 from ...output_paths import person_paths
+from ...scene_gaps import usual_step_s
 from ..budget import check_rows
 from .bvh import euler_zyx_degrees
 from .c3d import c3d_bytes
@@ -118,7 +119,7 @@ def _in_gap(motion: Motion, times_s: Float64Array) -> BoolArray:
     own_s = motion.timestamps
     if len(own_s) < 2:
         return np.zeros(len(times_s), bool)
-    usual_s = max(float(np.median(np.diff(own_s))), 1.0 / motion.mocap_framerate)
+    usual_s = max(usual_step_s(own_s), 1.0 / motion.mocap_framerate)
     after = np.clip(np.searchsorted(own_s, times_s), 1, len(own_s) - 1)
     before_s = times_s - own_s[after - 1]
     after_s = own_s[after] - times_s
