@@ -34,7 +34,7 @@ from .terminal import ProgressLine, print_message
 
 if TYPE_CHECKING:
     from ...solver.body import Body
-    from ..live.footage_recording import Footage
+    from ..live.footage_recording import FootageRecording
     from ..live.preview_page import PreviewPage
     from ..live.recording import PeopleRecording
     from ..live.run import LiveOptions, Output
@@ -97,7 +97,7 @@ def _capture(args: Namespace, values: Mapping[str, Any], options: LiveOptions) -
     :raises ScopeError: the source cannot be read, or an output failed.
     :raises KeyboardInterrupt: a second signal came; says what is written.
     """
-    from ..live.footage_recording import Footage
+    from ..live.footage_recording import FootageRecording
     from ..live.open_source import open_source
     from ..live.recording import Keep, PeopleRecording
     from ..live.run import Listeners, run_live
@@ -112,7 +112,9 @@ def _capture(args: Namespace, values: Mapping[str, Any], options: LiveOptions) -
     body = load_body(name)
     with ExitStack() as stack:
         outputs = _outputs(values, body, stack)
-        footage = Footage(values["keep_footage"], source.fps) if values["keep_footage"] else None
+        footage = (
+            FootageRecording(values["keep_footage"], source.fps) if values["keep_footage"] else None
+        )
         if footage and (left := unfinished_video(values["keep_footage"])).exists():
             print_message(f"{left} has the images of an earlier capture that was killed")
         recording = None
@@ -148,7 +150,7 @@ def _capture(args: Namespace, values: Mapping[str, Any], options: LiveOptions) -
     return report
 
 
-def _save(recording: PeopleRecording | None, footage: Footage | None) -> list[Path]:
+def _save(recording: PeopleRecording | None, footage: FootageRecording | None) -> list[Path]:
     """Write what was recorded, the one even if the other fails, and return the files.
 
     :raises ScopeError: one is not where it should be; says where it is.
@@ -156,7 +158,7 @@ def _save(recording: PeopleRecording | None, footage: Footage | None) -> list[Pa
     video = []
     failures: list[str] = []
 
-    def save_video(footage: Footage) -> None:
+    def save_video(footage: FootageRecording) -> None:
         try:
             video.append(footage.save())
         except (ScopeError, OSError):
@@ -185,7 +187,9 @@ def _tell_left_over(record: Path | None, saved: Sequence[Path]) -> None:
         print_message(f"warning: {others}")
 
 
-def _save_after_failure(recording: PeopleRecording | None, footage: Footage | None) -> bool:
+def _save_after_failure(
+    recording: PeopleRecording | None, footage: FootageRecording | None
+) -> bool:
     """Write what was recorded before a failure, which is what the command then tells last; return
     whether there was anything.
     """

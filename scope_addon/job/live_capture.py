@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from ...solver.errors import ScopeError
 from ..capture_report import warnings_as_json
 from ..errors import system_error_message
-from ..live.footage_recording import Footage
+from ..live.footage_recording import FootageRecording
 from ..live.open_source import open_source
 from ..live.pose import values
 from ..live.recording import Keep, PeopleRecording, unfinished_recording
@@ -52,7 +52,7 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
     clock = Clock()
     clock.stopped = commands.stopped
     kept = chosen["keep_footage"]
-    footage = Footage(Path(kept), source.fps) if kept else None
+    footage = FootageRecording(Path(kept), source.fps) if kept else None
     paths = motion_files(job_folder, options.people)
     keep = Keep(
         recordings_of(job_folder) / f"{job_folder.name}{SUFFIX}",
@@ -128,7 +128,7 @@ def motion_files(job_folder: Path, people: int) -> list[Path]:
     return [job_folder / MOTION.format(number + 1) for number in range(people)]
 
 
-def save_footage(footage: Footage) -> list[Notice]:
+def save_footage(footage: FootageRecording) -> list[Notice]:
     """Finish the video of a recording, which is not lost if that fails; return what went wrong."""
     try:
         footage.save()
@@ -156,7 +156,7 @@ class _Recorder:
         body: Body,
         source: Source,
         commands: Commands,
-        footage: Footage | None = None,
+        footage: FootageRecording | None = None,
         keep: Keep | None = None,
     ) -> None:
         self._footage = footage

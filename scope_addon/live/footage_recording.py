@@ -29,7 +29,7 @@ from .unfinished import Target, unfinished_video
 _WAITING = 16  # pictures; at 720p, 44 MB
 
 
-class Footage:
+class FootageRecording:
     """A video that is being written; `save` ends it."""
 
     def __init__(self, path: Path, fps: Fraction) -> None:

@@ -13,7 +13,7 @@ import pytest
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_writer import VideoWriter
 from scope.scope_addon.errors import OutputError
-from scope.scope_addon.live.footage_recording import Footage
+from scope.scope_addon.live.footage_recording import FootageRecording
 from scope.scope_addon.live.source import Picture
 
 TIMES = [7.0, 7.033, 7.2, 7.233, 7.3]  # frames were dropped on the way
@@ -25,7 +25,7 @@ def picture(k, shape=(49, 64, 3)):
 
 def test_pictures_keep_their_times_and_order(tmp_path):
     path = tmp_path / "take.mp4"
-    footage = Footage(path, Fraction(30))
+    footage = FootageRecording(path, Fraction(30))
     for k in range(len(TIMES)):
         footage.add(picture(k))
     assert footage.save() == path
@@ -45,9 +45,9 @@ import os, signal, sys, time
 from fractions import Fraction
 from pathlib import Path
 import numpy as np
-from scope.scope_addon.live.footage_recording import Footage
+from scope.scope_addon.live.footage_recording import FootageRecording
 from scope.scope_addon.live.source import Picture
-footage = Footage(Path(sys.argv[1]), Fraction(30))
+footage = FootageRecording(Path(sys.argv[1]), Fraction(30))
 for k in range(150):
     footage.add(Picture(k, k / 30, 0.0, np.full((48, 64, 3), k, np.uint8)))
     while footage._waiting.qsize():
@@ -72,12 +72,12 @@ def test_what_a_killed_capture_leaves_can_be_read_and_is_not_replaced(tmp_path):
 
 
 def test_without_pictures_nothing_is_written(tmp_path):
-    assert Footage(tmp_path / "take.mp4", Fraction(30)).save() is None
+    assert FootageRecording(tmp_path / "take.mp4", Fraction(30)).save() is None
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_that_cannot_be_written_is_said(tmp_path):
-    footage = Footage(tmp_path / "none" / "take.mp4", Fraction(30))
+    footage = FootageRecording(tmp_path / "none" / "take.mp4", Fraction(30))
     for k in range(len(TIMES)):
         footage.add(picture(k))
     with pytest.raises(OutputError, match="its folder does not exist"):
@@ -95,7 +95,7 @@ def test_a_full_disk_keeps_the_pictures_until_then_and_the_earlier_take(tmp_path
         write(writer, image, time_s)
 
     monkeypatch.setattr(VideoWriter, "write", full)
-    footage = Footage(path, Fraction(30))
+    footage = FootageRecording(path, Fraction(30))
     for k in range(90):
         footage.add(Picture(k, k / 30, 0.0, np.full((48, 64, 3), k, np.uint8)))
         while footage._waiting.qsize() and footage._thread.is_alive():
@@ -111,8 +111,8 @@ def test_a_full_disk_keeps_the_pictures_until_then_and_the_earlier_take(tmp_path
 def test_of_two_captures_at_once_neither_replaces_the_others_footage(tmp_path):
     path = tmp_path / "take.mp4"
     path.write_bytes(b"an earlier take")
-    first = Footage(path, Fraction(30))
-    second = Footage(path, Fraction(30))
+    first = FootageRecording(path, Fraction(30))
+    second = FootageRecording(path, Fraction(30))
     for k in range(len(TIMES)):
         first.add(picture(k))
         second.add(picture(k, (98, 128, 3)))
@@ -126,7 +126,7 @@ def test_of_two_captures_at_once_neither_replaces_the_others_footage(tmp_path):
 
 
 def test_pictures_of_another_size_are_left_out_and_counted(tmp_path):
-    footage = Footage(tmp_path / "take.mp4", Fraction(30))
+    footage = FootageRecording(tmp_path / "take.mp4", Fraction(30))
     footage.add(picture(0))
     footage.add(picture(1, (60, 80, 3)))
     path = footage.save()
@@ -142,7 +142,7 @@ def test_pictures_that_come_too_fast_are_told_from_those_of_another_size(tmp_pat
         write(*arguments)
 
     monkeypatch.setattr(VideoWriter, "write", slow)
-    footage = Footage(tmp_path / "take.mp4", Fraction(30))
+    footage = FootageRecording(tmp_path / "take.mp4", Fraction(30))
     for k in range(40):
         footage.add(Picture(k, k / 30, 0.0, np.full((48, 64, 3), k, np.uint8)))
     footage.add(picture(1, (64, 48, 3)))

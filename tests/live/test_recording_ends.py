@@ -21,7 +21,7 @@ from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line import live_command
 from scope.scope_addon.errors import NoPersonError, OutputError, UsageError, VideoError
 from scope.scope_addon.live import footage_recording, journal, run, unfinished
-from scope.scope_addon.live.footage_recording import Footage
+from scope.scope_addon.live.footage_recording import FootageRecording
 from scope.scope_addon.live.journal import read_about, read_records
 from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.recording import Keep, PeopleRecording, unfinished_recording
@@ -263,14 +263,14 @@ def test_of_two_recordings_that_begin_at_once_neither_replaces_the_other(tmp_pat
 def test_where_a_recording_is_is_said_if_the_folder_is_gone(tmp_path, body, monkeypatch, capfd):
     path = tmp_path / "out" / "take.npz"
     path.parent.mkdir()
-    images = Footage(path.with_suffix(".mp4"), Fraction(30))
+    images = FootageRecording(path.with_suffix(".mp4"), Fraction(30))
 
     def remove_folder():
         images.add(Picture(0, 0.0, 0.0, np.zeros((48, 64, 3), np.uint8)))
         shutil.rmtree(path.parent)
 
     fake_run(monkeypatch, remove_folder)
-    monkeypatch.setattr(footage_recording, "Footage", lambda *_: images)
+    monkeypatch.setattr(footage_recording, "FootageRecording", lambda *_: images)
     images_too = ["--keep-footage", str(path.with_suffix(".mp4"))]
     assert main(["live", str(SAMPLE), "--record", str(path), *images_too]) == 1
     said = capfd.readouterr().err
