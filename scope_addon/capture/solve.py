@@ -18,7 +18,7 @@ from ..kinematics.frame_blocks import to_single_precision
 from ..motion import Motion
 from .fitting.frame_sequence import FittedTrack
 from .fitting.prepared_track import PreparedTrack, prepare_track
-from .fitting.track_fit import fit_each_frame, fit_track, ground
+from .fitting.track_fit import fit_each_frame, fit_track, grounded
 from .tracking.expression_fit import with_expressions
 from .tracking.track import Track
 from .world.above_floor import raise_body
@@ -149,7 +149,7 @@ class Person:
         :param T_floor_camera: (4, 4) camera to world, with this person's floor at z = 0.
         """
         stance = shot.path.stance_to_frames(stance_on_ground(placed, T_floor_camera))
-        self.prepared, start = ground(self.prepared, self.fit, stance)
+        self.prepared, start = grounded(self.prepared, self.fit, stance)
         self.fit = to_single_precision(start)
 
     def refine(self, shot: Shot) -> None:

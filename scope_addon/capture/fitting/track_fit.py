@@ -58,7 +58,7 @@ def fit_single_frame(prepared: PreparedTrack) -> Fit | None:
     return found if is_usable(found) else None
 
 
-def ground(
+def grounded(
     prepared: PreparedTrack, first: FittedTrack, stance: Stance
 ) -> tuple[PreparedTrack, FittedTrack]:
     """Add the pelvis and the floor as estimated in a stance to the measurements, and move the first

@@ -65,7 +65,7 @@ def _stance(fit: FittedTrack, contact: float = 0.0, floor_m: float = 0.0) -> Sta
 
 def _refit(prepared, first, stance) -> FittedTrack:
     """All frames together, with the stance as a measurement, and then each alone."""
-    measured, start = track_fit.ground(prepared, first, stance)
+    measured, start = track_fit.grounded(prepared, first, stance)
     finished = fit_clip(measured, start, CameraPath.static(FRAMES), lambda *_: None)
     return track_fit.fit_each_frame(measured, finished, lambda *_: None)
 
