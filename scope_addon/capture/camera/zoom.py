@@ -19,7 +19,8 @@ from ...arrays import Float64Array
 from ...kinematics.smoothing import interpolated_rotations
 from .corner_tracks import SAMPLES_HZ, SLOW_S, CornerTracks
 from .intrinsics import Camera
-from .odometry import MIN_COMMON_SHARE, Sightings, Turn
+from .odometry import MIN_COMMON_SHARE, Sightings
+from .turn import Turn
 
 MIN_ZOOM = 0.06  # logarithm, in a link; cameras that only turn seem to zoom by a tenth of it
 # The same in a clip in which the camera also travels; those that travel and do not zoom reach half.
