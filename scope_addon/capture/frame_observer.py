@@ -245,19 +245,19 @@ class FrameObserver:
             for _, call in tracklet.references:
                 call.result()
         return Observed(
-            list(self._frames),
-            list(self._timestamps),
-            list(self._cut_rows),
-            self._tracklets,
-            self.background.record(),
-            execution,
-            list(warnings),
-            self.window,
-            self._first,
-            len(self._timestamps) if self._anchor is None else self._anchor,
-            list(self._checksums),
-            self._anchor_regions,
-            list(self._cuts.changes),
+            frames=list(self._frames),
+            timestamps=list(self._timestamps),
+            cut_rows=list(self._cut_rows),
+            tracklets=self._tracklets,
+            background=self.background.record(),
+            execution=execution,
+            warnings=list(warnings),
+            window=self.window,
+            first=self._first,
+            anchor=len(self._timestamps) if self._anchor is None else self._anchor,
+            checksums=list(self._checksums),
+            anchor_regions=self._anchor_regions,
+            picture_changes=list(self._cuts.changes),
         )
 
     def _track(
