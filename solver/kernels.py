@@ -10,7 +10,7 @@ is compiled by numba and called at every linearization, from several threads at 
     ints      (n, INTS), the rows of `Measurements.tables[name]`; floats (n, FLOATS) likewise
     weight    `Weights.tables[name]`, which multiplies the cost, and so JᵀJ and Jᵀr
     pose      `Pose`: pose.R[i], pose.t[i] of part i in the camera frame, metres, pose.Omega[i] of
-              its joint, pose.beta[:tree.shape]
+              its joint, pose.beta[:tree.shape_count]
     blocks    `Blocks`, the sums of all residuals: add to them and never set them
 
 It returns the sum of 1/2 weight |r|^2 and adds weight JᵀJ, which must be positive semidefinite, and

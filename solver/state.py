@@ -83,7 +83,7 @@ class State:
         pose.R[0] = nearest_rotation(R)
         pose.t[0] = t
         pose.Omega[1:] = nearest_rotation(Omega)
-        pose.beta[: tree.shape] = beta
+        pose.beta[: tree.shape_count] = beta
         pose.log_focal[0] = 0.0
 
     def arrays(self, tree: Tree) -> tuple[Array, Array, Array, Array]:
@@ -97,7 +97,7 @@ class State:
         Omega = as_array(self.Omega, (len(tree.parents) - 1, 3, 3), "Omega")
         check_rotations(R[None], "R_camera_root of the initial state")
         check_rotations(Omega, "Omega of the initial state")
-        return R, t, Omega, as_array(self.beta, (tree.shape,), "beta")
+        return R, t, Omega, as_array(self.beta, (tree.shape_count,), "beta")
 
     @classmethod
     def from_pose(cls, tree: Tree, pose: Pose) -> State:
@@ -106,7 +106,7 @@ class State:
             pose.R[0].copy(),
             pose.t[0].copy(),
             pose.Omega[1:].copy(),
-            pose.beta[: tree.shape].copy(),
+            pose.beta[: tree.shape_count].copy(),
         )
 
 

@@ -62,8 +62,8 @@ class Tree(NamedTuple):
     v_bar: Array  # (M+K+1, 3)
     V: Array  # (M+K+1, 3, W)
     keypoints: int  # M
-    shape: int  # P
-    globals: int  # P, or P + 1 with an unknown focal length, which is then column P
+    shape_count: int  # P
+    global_count: int  # P, or P + 1 with an unknown focal length, which is then column P
 
 
 def make_tree(body: BodyArrays, focal: bool = False) -> Tree:
@@ -125,15 +125,15 @@ def with_fixed_shape(tree: Tree, beta: ArrayLike) -> Tree:
     :raises ShapeError: beta has another shape.
     :raises InvalidValueError: beta is not finite.
     """
-    beta = _check(beta, (tree.shape,), "beta")
+    beta = _check(beta, (tree.shape_count,), "beta")
     n = len(tree.parents)
     m = len(tree.v_bar)
     return Tree(
         tree.parents,
         np.zeros((n, 3, 0)),
-        tree.l + tree.S[:, :, : tree.shape] @ beta,
+        tree.l + tree.S[:, :, : tree.shape_count] @ beta,
         tree.point_part,
-        tree.v_bar + tree.V[:, :, : tree.shape] @ beta,
+        tree.v_bar + tree.V[:, :, : tree.shape_count] @ beta,
         np.zeros((m, 3, 0)),
         tree.keypoints,
         0,

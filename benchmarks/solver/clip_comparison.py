@@ -47,7 +47,7 @@ def against_dense(rounds: int) -> list[dict[str, float]]:
         problem.linearize(0, poses, system)
         factor = make_factor(system)
         parts = len(problem.tree.parents)
-        H, g = dense_equations(system, frames, parts, problem.tree.globals, 1.0, scale)
+        H, g = dense_equations(system, frames, parts, problem.tree.global_count, 1.0, scale)
         J = np.random.default_rng(0).standard_normal(
             (frames * RESIDUALS_PER_FRAME + 3 * (frames - 2) * parts, len(g))
         )

@@ -80,7 +80,7 @@ def make_clip(
     motion = MotionTerms.make(tree, np.arange(frames) / RATE, MOTION, stands)
     stage = Stage(Weights(tables={"outline": OUTLINE_WEIGHT}))
     settings = make_settings(Options(stages=[stage]), [stage])
-    P = tree.shape
+    P = tree.shape_count
     return ClipProblem(
         tree, views, motion, SharedPriors(np.zeros(P), np.eye(P), None), settings, pool
     ), poses

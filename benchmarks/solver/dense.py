@@ -67,7 +67,7 @@ def _write_row(  # type: ignore[no-untyped-def]
         J[row, 4] = gy
         J[row, 5] = gz
     first = 3 + 3 * tree.parents.shape[0]
-    for a in range(tree.shape):
+    for a in range(tree.shape_count):
         J[row, first + a] = gx * moved[0, a] + gy * moved[1, a] + gz * moved[2, a]
 
 
@@ -87,7 +87,7 @@ def fill(tree, terms, stage, pose, J, r, moved) -> None:  # type: ignore[no-unty
             x = v[0]
             y = v[1]
             z = v[2]
-            for a in range(tree.shape):
+            for a in range(tree.shape_count):
                 x += terms.V[j, 0, a] * pose.beta[a]
                 y += terms.V[j, 1, a] * pose.beta[a]
                 z += terms.V[j, 2, a] * pose.beta[a]
@@ -98,7 +98,7 @@ def fill(tree, terms, stage, pose, J, r, moved) -> None:  # type: ignore[no-unty
             )
             p = (lever[0] + t[0], lever[1] + t[1], lever[2] + t[2])
             for k in range(3):
-                for a in range(tree.shape):
+                for a in range(tree.shape_count):
                     turned = (
                         R[k, 0] * terms.V[j, 0, a]
                         + R[k, 1] * terms.V[j, 1, a]
@@ -153,7 +153,7 @@ def fill(tree, terms, stage, pose, J, r, moved) -> None:  # type: ignore[no-unty
                 row += 3
     first = 3 + 3 * tree.parents.shape[0]
     w = np.sqrt(weights[SHAPE_PRIOR])  # the population's shape prior: identity
-    for a in range(tree.shape):
+    for a in range(tree.shape_count):
         J[row + a, first + a] = w
         r[row + a] = w * (pose.beta[a] - terms.shape_mean[a])
 
@@ -211,7 +211,7 @@ class Dense:
         tree = self.problem.tree
         counts = [np.count_nonzero(terms.flags & bit) for bit in (HAS_2D, HAS_3D, HAS_DIRECTION)]
         K = len(tree.parents) - 1
-        P = tree.shape
+        P = tree.shape_count
         self.J = np.zeros((2 * counts[0] + 3 * counts[1] + 3 * counts[2] + P, 6 + 3 * K + P))
         self.r = np.zeros(len(self.J))
         self.moved = np.zeros((2, 3, max(P, 1)))

@@ -52,7 +52,7 @@ class Residuals:
         n = len(work.u)
         work.x[0] = d[:6]
         work.u[1:] = d[6 : 3 + 3 * n].reshape(-1, 3)
-        work.dbeta[: p.tree.shape] = d[3 + 3 * n :]
+        work.dbeta[: p.tree.shape_count] = d[3 + 3 * n :]
         retract(p.tree, self.base, work, self.trial)
         fill(p.tree, p.terms, p.stage, self.trial, self.dense.J, self.dense.r, self.dense.moved)
         return self.dense.r, self.dense.J

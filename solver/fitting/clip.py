@@ -128,7 +128,7 @@ def fit_clip(
         focal_weight if focal else None,
     )
     joint.optimize()
-    beta = joint.beta[: tree.shape].copy()
+    beta = joint.beta[: tree.shape_count].copy()
     scale = float(np.exp(joint.log_focal))
     joint_fits = joint.fits()
     by_frame = dict(zip(chosen, joint_fits, strict=True))
@@ -275,8 +275,8 @@ class _Joint(SeveralFrames):
         super().__init__()
         self.tree = tree
         self.report = options.report
-        self.P = tree.shape
-        self.shared = SharedPriors(*priors.packed_shape(tree.shape), focal_weight)
+        self.P = tree.shape_count
+        self.shared = SharedPriors(*priors.packed_shape(tree.shape_count), focal_weight)
         self.settings = make_settings(options, options.schedule(cold=False))
         self.stages = self.settings.stages
         self.shape_weights = self.stages[:, 0, SHAPE_PRIOR].copy()
@@ -413,7 +413,7 @@ class _Joint(SeveralFrames):
             prior: Array = self.shape_weights[-1] * self.shared.shape_information
             return prior
         C, _, _ = self._reduced(len(self.stages) - 1, MIN_DAMPING)
-        return shape_information(C[: self.tree.globals, : self.tree.globals], P)
+        return shape_information(C[: self.tree.global_count, : self.tree.global_count], P)
 
 
 def shape_information(information: Array, P: int) -> Array:

@@ -179,7 +179,7 @@ class _Problem:
 
     def hessian(self) -> Array:
         """Return H (n, n)."""
-        axes = np.eye(3 + 3 * len(self.tree.parents) + self.tree.shape)
+        axes = np.eye(3 + 3 * len(self.tree.parents) + self.tree.shape_count)
         H: Array = np.array([self._hessian_along(axis) for axis in axes])
         return 0.5 * (H + H.T)
 

@@ -230,7 +230,7 @@ class FrameSolver:
         if isinstance(init, State):
             return run(init, settings)
         mean = self._mean(priors)
-        shape = packed.shape_mean[: tree.shape]
+        shape = packed.shape_mean[: tree.shape_count]
         starts = initial_states(tree, terms, mean, shape, several=multi and count > 0)
 
         def cheapest(starts: Sequence[State], terms: Terms) -> Fit:
@@ -270,7 +270,7 @@ class FrameSolver:
         tree = self.tree
         memory = self._memory
         work = memory.work
-        P = tree.shape
+        P = tree.shape_count
         last = settings.stages[-1]
         start.write_to(tree, memory.poses[0])
         seen, count = counts

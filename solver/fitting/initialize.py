@@ -36,7 +36,7 @@ def _place_slots(tree: Tree, terms: Terms, pose: Pose) -> tuple[Array, Array]:
     """
     place_parts(tree, pose)
     part = np.repeat(np.arange(len(tree.parents)), np.diff(terms.starts))
-    P = tree.shape
+    P = tree.shape_count
     rest = terms.rest + terms.V[:, :, :P] @ pose.beta[:P]
     levers: Array = np.einsum("nij,nj->ni", pose.R[part], rest)
     return levers, levers + pose.t[part]
@@ -80,7 +80,7 @@ def initial_states(
     """
     pose = make_pose(tree)
     pose.Omega[1:] = joint_mean
-    pose.beta[: tree.shape] = beta
+    pose.beta[: tree.shape_count] = beta
     levers, points = _place_slots(tree, terms, pose)
     is_3d = terms.flags & HAS_3D > 0
     measured = terms.point[is_3d, :3]

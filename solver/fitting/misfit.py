@@ -201,7 +201,7 @@ def _seen_and_fitted(
     usable = (np.abs(measured) < LARGEST).all(axis=1) & (confidence > 0.0)
     indices = np.asarray(seen.indices)[usable]
     part = tree.point_part[indices]
-    levers = tree.v_bar[indices] + tree.V[indices][:, :, : tree.shape] @ found.state.beta
+    levers = tree.v_bar[indices] + tree.V[indices][:, :, : tree.shape_count] @ found.state.beta
     turned = np.einsum("nij,nj->ni", found.R_camera_part[part], levers)
     return measured[usable], found.t_camera_part[part] + turned
 

@@ -148,7 +148,7 @@ def gradient(tree: Tree, terms: Terms, stage: Array, state: State) -> Array:
         forces[tree.parents[i]] += forces[i]
     moments = forces[1:, :3] - np.cross(pose.t[1:] - pose.t[0], forces[1:, 3:])
     joints = blocks.H_u[1:, :, GRADIENT] + moments
-    return np.concatenate([forces[0], joints.ravel(), blocks.c[: tree.shape]])
+    return np.concatenate([forces[0], joints.ravel(), blocks.c[: tree.shape_count]])
 
 
 def preconditioner(
@@ -162,7 +162,7 @@ def preconditioner(
         blocks.A[:, :, GRADIENT] = 0.0
         blocks.A[0, :, GRADIENT] = b[:6]
         blocks.H_u[1:, :, GRADIENT] = b[6:end].reshape(-1, 3)
-        blocks.c[: tree.shape] = b[end:]
+        blocks.c[: tree.shape_count] = b[end:]
         step(tree, pose, blocks, MIN_DAMPING, 1.0, work)
         return -_direction(tree, work)
 
@@ -177,7 +177,7 @@ def remaining_decrease(tree: Tree, terms: Terms, stage: Array, state: State) -> 
 
 def _direction(tree: Tree, work: Workspace) -> Array:
     """Return the step (n,) that is in `work`."""
-    return np.concatenate([work.x[0], work.u[1:].ravel(), work.dbeta[: tree.shape]])
+    return np.concatenate([work.x[0], work.u[1:].ravel(), work.dbeta[: tree.shape_count]])
 
 
 def _linearized(
@@ -194,7 +194,7 @@ def _linearized(
 
 def _dense(tree: Tree, pose: Pose, blocks: Blocks) -> tuple[Array, Array]:
     """Return the gradient (n,) and JᵀJ (n, n) of the blocks of all parts."""
-    P = tree.shape
+    P = tree.shape_count
     n = 3 + 3 * len(tree.parents) + P
     end = SHAPE + P
     g = np.zeros(n)
@@ -220,7 +220,7 @@ def _dense(tree: Tree, pose: Pose, blocks: Blocks) -> tuple[Array, Array]:
 
 def motion_of_parts(tree: Tree, pose: Pose) -> Array:
     """Return X (K+1, 6, n): the twist of each part about the pelvis is x_i = X_i d."""
-    n = 3 + 3 * len(tree.parents) + tree.shape
+    n = 3 + 3 * len(tree.parents) + tree.shape_count
     X = np.zeros((len(tree.parents), 6, n))
     X[0] = np.eye(6, n)
     levers = hat(pose.t - pose.t[0])
@@ -238,14 +238,14 @@ def motion_of_joints(tree: Tree, pose: Pose) -> Array:
     """
     X = motion_of_parts(tree, pose)
     motion: Array = X[:, 3:] - hat(pose.t - pose.t[0]) @ X[:, :3]
-    motion[:, :, X.shape[2] - tree.shape :] += pose.D[:, :, : tree.shape]
+    motion[:, :, X.shape[2] - tree.shape_count :] += pose.D[:, :, : tree.shape_count]
     return motion
 
 
 def moved(tree: Tree, state: State, d: Array) -> State:
     """Return the state after a step d (n,) of the unknowns."""
     R_parent = state.pose(tree).R[tree.parents[1:]]
-    last = len(d) - tree.shape
+    last = len(d) - tree.shape_count
     turns = exp(d[6:last].reshape(-1, 3))
     Omega = np.swapaxes(R_parent, 1, 2) @ turns @ R_parent @ state.Omega
     R = exp(d[:3]) @ state.R_camera_root
@@ -345,4 +345,4 @@ def _random_state(tree: Tree, seed: int) -> State:
     K = len(tree.parents) - 1
     place = np.array([0.0, 0.0, 3.0]) + 0.2 * rng.standard_normal(3)
     Omega = exp(0.5 * rng.standard_normal((K, 3)))
-    return State(exp(rng.standard_normal(3)), place, Omega, rng.standard_normal(tree.shape))
+    return State(exp(rng.standard_normal(3)), place, Omega, rng.standard_normal(tree.shape_count))

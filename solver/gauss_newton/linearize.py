@@ -88,7 +88,7 @@ def place_parts(tree: Tree, pose: Pose) -> None:
         x = tree.l[i, 0]
         y = tree.l[i, 1]
         z = tree.l[i, 2]
-        for a in range(tree.shape):
+        for a in range(tree.shape_count):
             b = pose.beta[a]
             x += tree.S[i, 0, a] * b
             y += tree.S[i, 1, a] * b
@@ -191,8 +191,8 @@ def _add_points(  # type: ignore[no-untyped-def]
     B = blocks.A[i]
     C = blocks.C
     c = blocks.c
-    P = tree.shape
-    fit_focal = tree.globals > P
+    P = tree.shape_count
+    fit_focal = tree.global_count > P
     r = entries(pose.R[i])
     w_sum = _ZERO6
     b_sum = _ZERO9

@@ -186,7 +186,7 @@ def eliminate(
     for r in range(6):
         squares += root[r, GRADIENT] ** 2
     subtract_eliminated(root, C, c)
-    for a in range(tree.globals):
+    for a in range(tree.global_count):
         for b in range(a):
             C[a, b] = C[b, a]
     return squares
@@ -197,7 +197,7 @@ def solve_globals(tree: Tree, C, c, dbeta) -> float:  # type: ignore[no-untyped-
     """Solve C dbeta = -c for the global columns, overwriting C with its factor; return |L^-1
     c|^2.
     """
-    P = tree.globals
+    P = tree.global_count
     factorize(C, P, dbeta)
     for a in range(P):
         dbeta[a] = -c[a]
@@ -226,7 +226,7 @@ def substitute(tree: Tree, pose: Pose, damping: float, root_scale: float, work: 
     Y = work.Y
     root = work.root
     dbeta = work.dbeta
-    P = tree.globals
+    P = tree.global_count
     for r in range(5, -1, -1):
         s = -root[r, GRADIENT]
         for a in range(P):
@@ -316,8 +316,8 @@ def move(tree, pose, x, u, dg, trial):  # type: ignore[no-untyped-def]
         write_entries(product(E, entries(old)), new)
     for r in range(3):
         trial.t[0, r] = pose.t[0, r] + x[3 + r]
-    for a in range(tree.shape):
+    for a in range(tree.shape_count):
         trial.beta[a] = pose.beta[a] + dg[a]
     trial.log_focal[0] = pose.log_focal[0]
-    if tree.globals > tree.shape:
-        trial.log_focal[0] += dg[tree.shape]
+    if tree.global_count > tree.shape_count:
+        trial.log_focal[0] += dg[tree.shape_count]

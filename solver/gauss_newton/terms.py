@@ -220,7 +220,7 @@ def pack_priors(tree: Tree, priors: "Priors") -> PackedPriors:
         # read-only
         tables[name] = ints.copy(), floats.copy()
     W = tree.S.shape[2]
-    mean, information = priors.packed_shape(tree.shape)
+    mean, information = priors.packed_shape(tree.shape_count)
     return PackedPriors(tables, _padded(mean, (W,)), _padded(information, (W, W)))
 
 

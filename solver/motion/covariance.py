@@ -48,7 +48,7 @@ def joint_covariances(
     """
     eliminate_clip(system, MIN_DAMPING, root_scale, factor, pool)
     T, n, _ = system.N.shape
-    G = tree.globals
+    G = tree.global_count
     parts = len(tree.parents)
     shared = _shared_covariance(factor.C[:G, :G])
     out = ClipCovariance(np.empty((T, parts, 3, 3)), np.empty((T, parts, 3, 3)), shared)
@@ -94,7 +94,7 @@ def _select(
     """
     n = Z.shape[1]
     unknowns = 3 + 3 * len(tree.parents)
-    rows = np.r_[:unknowns, 3 * n : 3 * n + tree.shape]
+    rows = np.r_[:unknowns, 3 * n : 3 * n + tree.shape_count]
     kept = np.r_[: 2 * n, 3 * n : len(later) + n]
     for f in frames:
         inverse_pivots = np.diagonal(Z[f])

@@ -217,7 +217,7 @@ def _checked_shape(shape: ArrayLike | None, tree: Tree, focal: bool) -> Array | 
         raise InvalidValueError(
             "The focal length can only be estimated together with the shape; leave `shape` out."
         )
-    return as_finite(shape, (tree.shape,), "shape")
+    return as_finite(shape, (tree.shape_count,), "shape")
 
 
 def _first_states(
@@ -256,7 +256,7 @@ class _Clip:
         """Take over the states."""
         T = len(self.frames)
         K = len(self.tree.parents) - 1
-        P = self.tree.shape
+        P = self.tree.shape_count
         self.R = np.empty((T, K + 1, 3, 3))
         self.t = np.empty((T, K + 1, 3))
         self.Omega = np.empty((T, K, 3, 3))
@@ -275,7 +275,7 @@ class _Clip:
         self.rejected = 0
         self.costs: dict[str, float] = {}
 
-    def solve(self, free: Tree, shape: Array | None, windows: list[Window]) -> MotionFit:
+    def solve(self, free: Tree, shape: Array | None, windows: list[FitWindow]) -> MotionFit:
         """Optimize the clip and return the result.
 
         `free` has the global columns that are unknown unless the shape is given.
@@ -284,7 +284,7 @@ class _Clip:
             self._keep(free, self._optimize(free, windows[0]), windows[0])
         else:
             if shape is None:
-                self._find_shared(free, [Window(w.kept, w.kept) for w in windows])
+                self._find_shared(free, [FitWindow(w.kept, w.kept) for w in windows])
             else:
                 self.beta = shape.copy()
             fixed = with_fixed_shape(self.tree, self.beta)
@@ -292,9 +292,9 @@ class _Clip:
                 self._keep(fixed, self._optimize(fixed, window), window)
         return self._result()
 
-    def _optimize(self, tree: Tree, window: Window) -> Optimizer:
+    def _optimize(self, tree: Tree, window: FitWindow) -> Optimizer:
         """Optimize the frames of a window with the global columns of `tree`."""
-        P = tree.shape
+        P = tree.shape_count
         priors = self.priors if P else without_shape(self.priors)
         frames = self.frames[window.frames]
         views, self.counts[window.frames] = pack_frames(tree, frames, pack_priors(tree, priors))
@@ -304,7 +304,7 @@ class _Clip:
         poses.Omega[:, 1:] = self.Omega[window.frames]
         poses.beta[:P] = self.beta[:P]
         poses.log_focal[:] = self.log_focal
-        focal_weight = self.focal_weight if tree.globals > P else None
+        focal_weight = self.focal_weight if tree.global_count > P else None
         shared = SharedPriors(*priors.packed_shape(P), focal_weight)
         settings = make_settings(self.options, self.options.schedule(cold=False))
         for name in ("joint_prior", "joint_flow"):
@@ -326,14 +326,14 @@ class _Clip:
         self.rejected += optimizer.rejected
         return optimizer
 
-    def _find_shared(self, tree: Tree, parts: list[Window]) -> None:
+    def _find_shared(self, tree: Tree, parts: list[FitWindow]) -> None:
         """Set the shape, and the focal length, to what parts of the clip say together; keep the
         parts' poses.
         """
         estimates = []
         informations = []
-        P = tree.shape
-        G = tree.globals
+        P = tree.shape_count
+        G = tree.global_count
         for part in parts:
             optimizer = self._optimize(tree, part)
             self._keep_poses(optimizer.poses, part)
@@ -353,23 +353,23 @@ class _Clip:
         self.log_focal = float(shared[P]) if G > P else 0.0
         self.information = shape_information(self.information, P)
 
-    def _keep_poses(self, poses: Pose, window: Window) -> None:
+    def _keep_poses(self, poses: Pose, window: FitWindow) -> None:
         inner = window.inner
         self.R[window.kept] = poses.R[inner]
         self.t[window.kept] = poses.t[inner]
         self.Omega[window.kept] = poses.Omega[inner, 1:]
 
-    def _keep(self, tree: Tree, optimizer: Optimizer, window: Window) -> None:
+    def _keep(self, tree: Tree, optimizer: Optimizer, window: FitWindow) -> None:
         """Take over what a window is kept for."""
         poses = optimizer.poses
         self._keep_poses(poses, window)
         self.cost += optimizer.cost
         for name, cost in optimizer.costs.items():
             self.costs[name] = self.costs.get(name, 0.0) + cost
-        if tree.shape:
-            self.beta = poses.beta[: tree.shape].copy()
+        if tree.shape_count:
+            self.beta = poses.beta[: tree.shape_count].copy()
             self.log_focal = float(poses.log_focal[0])
-            self.information = shape_information(optimizer.information(), tree.shape)
+            self.information = shape_information(optimizer.information(), tree.shape_count)
         if self.covariances is None:
             return
         inner = window.inner
@@ -406,7 +406,7 @@ class _Clip:
         )
 
 
-class Window(NamedTuple):
+class FitWindow(NamedTuple):
     """Consecutive frames that are optimized together, and those of them whose result is kept."""
 
     frames: slice
@@ -419,7 +419,7 @@ class Window(NamedTuple):
         return slice(self.kept.start - first, self.kept.stop - first)
 
 
-def overlapping(times: Array, length: float, overlap: float) -> list[Window]:
+def overlapping(times: Array, length: float, overlap: float) -> list[FitWindow]:
     """Return windows of `length` seconds that overlap, each kept up to the middle of its overlaps;
     one if that does.
 
@@ -428,7 +428,7 @@ def overlapping(times: Array, length: float, overlap: float) -> list[Window]:
     T = len(times)
     span = float(times[-1] - times[0])
     if span <= length:
-        return [Window(slice(0, T), slice(0, T))]
+        return [FitWindow(slice(0, T), slice(0, T))]
     count = int(np.ceil((span - overlap) / (length - overlap)))
     starts = times[0] + np.arange(count) * (span - length) / (count - 1)
     first = np.searchsorted(times, starts)
@@ -438,7 +438,7 @@ def overlapping(times: Array, length: float, overlap: float) -> list[Window]:
     first[1:] = np.minimum(first[1:], last[:-1])
     middle = [0, *((a + b) // 2 for a, b in zip(first[1:], last[:-1], strict=True)), T]
     return [
-        Window(slice(int(first[k]), int(last[k])), slice(int(middle[k]), int(middle[k + 1])))
+        FitWindow(slice(int(first[k]), int(last[k])), slice(int(middle[k]), int(middle[k + 1])))
         for k in range(count)
         if middle[k] < middle[k + 1]  # a longer gap between frames leaves windows empty
     ]

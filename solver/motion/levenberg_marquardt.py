@@ -158,7 +158,7 @@ class Optimizer(SeveralFrames):
         """Return the information (G, G) of the global columns with all poses eliminated, priors
         included.
         """
-        G = self.problem.tree.globals
+        G = self.problem.tree.global_count
         root_scale = self.settings.root_scale
         eliminate_clip(self.system, MIN_DAMPING, root_scale, self.factor, self.pool)
         C = np.triu(self.factor.C[:G, :G])

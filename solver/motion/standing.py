@@ -40,7 +40,7 @@ def _jacobian(tree, poses, f, j, count, p, J) -> None:  # type: ignore[no-untype
     for r in range(3):
         for s in range(3):
             J[r, 3 + s] = 1.0 if r == s else 0.0
-    for a in range(tree.shape):
+    for a in range(tree.shape_count):
         B = shape_derivative(tree, pose, j, i, a)
         for r in range(3):
             J[r, count + a] = B[r]
@@ -97,7 +97,7 @@ def accumulate(tree, first, last, work, system, C, c) -> float:  # type: ignore[
     work (3, 1+W) is overwritten.
     """
     cost: float = 0.0
-    P = tree.shape
+    P = tree.shape_count
     w, p, J, columns, counts = system.contacts
     force = work[:, 0]
     moved = work[:, 1:]

@@ -79,7 +79,7 @@ def lever(tree, pose, k):  # type: ignore[no-untyped-def]
     x = tree.v_bar[k, 0]
     y = tree.v_bar[k, 1]
     z = tree.v_bar[k, 2]
-    for a in range(tree.shape):
+    for a in range(tree.shape_count):
         b = pose.beta[a]
         x += tree.V[k, 0, a] * b
         y += tree.V[k, 1, a] * b
@@ -125,7 +125,7 @@ def add_to_point(  # type: ignore[no-untyped-def]
     f = (f0, f1, f2)
     b = cross_symmetric(e, w)
     add_block(A, cross_both(e, b), b, w, add_cross((0.0, 0.0, 0.0), e, f), f)
-    for a in range(tree.shape):
+    for a in range(tree.shape_count):
         B = shape_derivative(tree, pose, k, i, a)
         blocks.c[a] += B[0] * f0 + B[1] * f1 + B[2] * f2
         g = rotated(symmetric(w), B)
@@ -133,6 +133,6 @@ def add_to_point(  # type: ignore[no-untyped-def]
         for r in range(3):
             A[r, SHAPE + a] += m[r]
             A[3 + r, SHAPE + a] += g[r]
-        for d in range(a, tree.shape):
+        for d in range(a, tree.shape_count):
             E = shape_derivative(tree, pose, k, i, d)
             blocks.C[a, d] += g[0] * E[0] + g[1] * E[1] + g[2] * E[2]

@@ -330,7 +330,7 @@ def accumulate_function(
     :raises InvalidValueError: they are not finite.
     """
     tree, ints, floats, pose, blocks = _arrays(values, columns_of_ints, columns_of_floats)
-    P = int(tree.shape)
+    P = int(tree.shape_count)
     cost = 0.0
     s = math.sqrt(weight)
     for k in range(len(ints) if weight > 0.0 else 0):

@@ -26,7 +26,7 @@ def test_dense_matrix_and_elimination_give_the_same_step():
     problem.linearize(0, poses, system)
     factor = make_factor(system)
     parts = len(problem.tree.parents)
-    count = problem.tree.globals
+    count = problem.tree.global_count
     solve_clip(problem.tree, system, 1.0, scale, factor)
     d = solve_cholesky(*dense_equations(system, 5, parts, count, 1.0, scale))
     steps = d[:-count].reshape(5, -1)

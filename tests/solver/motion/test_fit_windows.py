@@ -3,10 +3,10 @@
 
 import numpy as np
 import pytest
-from scope.solver.motion.fit import Window, combined, overlapping
+from scope.solver.motion.fit import FitWindow, combined, overlapping
 
 
-def frames_kept(windows: list[Window]) -> list[int]:
+def frames_kept(windows: list[FitWindow]) -> list[int]:
     """The frames that windows are kept for, none of them empty, in their order."""
     for w in windows:
         assert w.frames.start <= w.kept.start < w.kept.stop <= w.frames.stop

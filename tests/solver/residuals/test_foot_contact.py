@@ -35,7 +35,7 @@ def points(state):
     tree = make_tree(BODY)
     pose = state.pose(tree)
     n = len(NAMES)
-    local = tree.V[:n, :, : tree.shape] @ state.beta + tree.v_bar[:n]
+    local = tree.V[:n, :, : tree.shape_count] @ state.beta + tree.v_bar[:n]
     return np.einsum("mij,mj->mi", pose.R[tree.point_part[:n]], local) + pose.t[tree.point_part[:n]]
 
 
