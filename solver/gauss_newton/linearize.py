@@ -15,6 +15,8 @@ each part `_add_points` with `_point_terms` for each of its points, then `add_bl
 are in plain_rows.py.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..kernel import expanded_kernel, kernel
@@ -32,7 +34,7 @@ from ..matrices import (
 )
 from ..part import GRADIENT, SHAPE, Array, Blocks, Pose
 from ..residuals import keypoint2d, keypoint3d, orientation_field, shape_prior
-from ..residuals.accumulation import add_block
+from ..residuals.accumulation import add_block, shaped
 from ..residuals.external import accumulate_external
 from ..residuals.registry import (
     KEYPOINT2D,
@@ -85,14 +87,7 @@ def place_parts(tree: Tree, pose: Pose) -> None:
     for i in range(1, tree.parents.shape[0]):
         j = tree.parents[i]
         Q = entries(R[j])
-        x = tree.l[i, 0]
-        y = tree.l[i, 1]
-        z = tree.l[i, 2]
-        for a in range(tree.shape_count):
-            b = pose.beta[a]
-            x += tree.S[i, 0, a] * b
-            y += tree.S[i, 1, a] * b
-            z += tree.S[i, 2, a] * b
+        x, y, z = shaped(tree.l, tree.S, pose.beta, i, tree.shape_count)
         place_origin(pose.D[j], Q, tree.S[i], pose.D[i])
         write_entries(product(Q, entries(pose.Omega[i])), R[i])
         for r in range(3):
@@ -114,32 +109,39 @@ def clear_blocks(blocks: Blocks) -> None:
     blocks.c[:] = 0.0
 
 
-@expanded_kernel
-def point_at_rest(terms, beta, j, P):  # type: ignore[no-untyped-def]
-    """Return V_j beta + v_bar_j of slot j, in its part's axes."""
-    x = terms.rest[j, 0]
-    y = terms.rest[j, 1]
-    z = terms.rest[j, 2]
-    if terms.flags[j] & HAS_SHAPE:
-        for a in range(P):
-            b = beta[a]
-            x += terms.V[j, 0, a] * b
-            y += terms.V[j, 1, a] * b
-            z += terms.V[j, 2, a] * b
-    return x, y, z
+class Strengths(NamedTuple):
+    """Weight and 1/sigma of each kind of measurement in a stage, and the focal scale."""
+
+    image: tuple[float, float]
+    space: tuple[float, float]
+    direction: tuple[float, float]
+    focal: float
+
+
+class PointTerms(NamedTuple):
+    """What the terms of one slot add up to, with W and e' as above and E = [e']x."""
+
+    W: tuple[float, ...]  # (6), of the position terms
+    EW: tuple[float, ...]  # (9)
+    W_all: tuple[float, ...]  # (6), W + W_d
+    EW_all: tuple[float, ...]  # (9), EW + [e]x W_d
+    EWE: tuple[float, ...]  # (6), EWEᵀ + [e]x W_d [e]xᵀ
+    force: tuple[float, ...]  # (3), f
+    force_all: tuple[float, ...]  # (3), f + f_d
+    moment: tuple[float, ...]  # (3), about the pelvis
+    focal_force: tuple[float, ...]  # (3), Gᵀg, with g = dr/dlog f of the focal length
+    focal_square: float  # gᵀg
+    focal_gradient: float  # gᵀr
 
 
 @expanded_kernel
-def _point_terms(terms, j, e, s, t, settings, cost):  # type: ignore[no-untyped-def]
-    """Evaluate what was measured of slot j, at e (3) from its part's origin, which is at s (3) from
-    the pelvis and at t (3) in the camera.
-
-    settings: weight and 1/sigma of each kind of term, focal scale.
-    Return the cost so far; W = GᵀG, [e']x W and Gᵀr of the position terms; W, [e']x W + [e]x W_d
-    and Gᵀr of all; [e']x W [e']xᵀ + [e]x W_d [e]xᵀ and the moment about the pelvis; and Gᵀg (3),
-    gᵀg and gᵀr of the focal length, g = dr/dlog f.
+def _point_terms(terms, j, e, s, t, strengths, cost):  # type: ignore[no-untyped-def]
+    """Return the cost so far, with what was measured of slot j, and its `PointTerms`; the point is
+    at e (3) from its part's origin, which is at s (3) from the pelvis and at t (3) in the camera.
     """
-    w2, k2, w3, k3, wd, kd, focal = settings
+    w2, k2 = strengths.image
+    w3, k3 = strengths.space
+    wd, kd = strengths.direction
     flags = terms.flags[j]
     p = add3(e, t)
     e_pelvis = add3(e, s)
@@ -150,7 +152,7 @@ def _point_terms(terms, j, e, s, t, settings, cost):  # type: ignore[no-untyped-
     fr = 0.0
     if flags & HAS_2D:
         q = terms.image[j]
-        more, w, f, h, ff, fr = keypoint2d.term(p, (q[0], q[1]), focal, w2 * q[2], k2)
+        more, w, f, h, ff, fr = keypoint2d.term(p, (q[0], q[1]), strengths.focal, w2 * q[2], k2)
         cost += more
     if flags & HAS_3D:
         q = terms.point[j]
@@ -174,17 +176,16 @@ def _point_terms(terms, j, e, s, t, settings, cost):  # type: ignore[no-untyped-
         w_all = add6(w, w_more)
         b_all = add9(b, b_more)
         f_all = add3(f, f_more)
-    return cost, w, b, f, w_all, b_all, f_all, y, moment, h, ff, fr
+    return cost, PointTerms(w, b, w_all, b_all, y, f, f_all, moment, h, ff, fr)
 
 
 @expanded_kernel
 def _add_points(  # type: ignore[no-untyped-def]
-    tree, terms, i, s, t, settings, pose, blocks, scratch, cost
+    tree, terms, i, s, t, strengths, pose, blocks, scratch, cost
 ):
     """Add the terms of part i's points to the cost, N, C and c.
 
-    s, t: the part's origin from the pelvis and in the camera; settings: weight and 1/sigma of each
-    kind of term, focal scale.
+    s, t: the part's origin from the pelvis and in the camera; strengths: `Strengths`.
     Return the cost and sums over the points about the pelvis: of [e']x W [e']xᵀ + [e]x W_d [e]xᵀ
     (6), [e']x W (9), W (6), the moment (3) and the force (3).
     """
@@ -203,20 +204,19 @@ def _add_points(  # type: ignore[no-untyped-def]
         flags = terms.flags[j]
         if flags <= HAS_SHAPE:
             continue
-        e = rotated(r, point_at_rest(terms, pose.beta, j, P))
-        cost, w, b, f, w_all, b_all, f_all, y, m, h, ff, fr = _point_terms(
-            terms, j, e, s, t, settings, cost
-        )
-        w_sum = add6(w_sum, w)
-        b_sum = add9(b_sum, b)
-        y_sum = add6(y_sum, y)
-        force = add3(force, f)
-        moment = add3(moment, m)
+        e = rotated(r, shaped(terms.rest, terms.V, pose.beta, j, P if flags & HAS_SHAPE else 0))
+        cost, p = _point_terms(terms, j, e, s, t, strengths, cost)
+        w_sum = add6(w_sum, p.W)
+        b_sum = add9(b_sum, p.EW)
+        y_sum = add6(y_sum, p.EWE)
+        force = add3(force, p.force)
+        moment = add3(moment, p.moment)
         if flags & HAS_SHAPE:
-            add_point(terms.V[j], r, w, w_all, b_all, f_all, B, C, c, scratch)
+            add_point(terms.V[j], r, p.W, p.W_all, p.EW_all, p.force_all, B, C, c, scratch)
         if fit_focal and flags & HAS_2D:
-            C[P, P] += ff
-            c[P] += fr
+            h = p.focal_force
+            C[P, P] += p.focal_square
+            c[P] += p.focal_gradient
             focal_moment = add_cross(_ZERO3, add3(e, s), h)
             for k in range(3):
                 B[k, SHAPE + P] += focal_moment[k]
@@ -244,10 +244,12 @@ def linearize(
     place_parts(tree, pose)
     weights = stage[0]
     inv_sigma = stage[1]
-    settings = (
-        weights[KEYPOINT2D], inv_sigma[KEYPOINT2D], weights[KEYPOINT3D], inv_sigma[KEYPOINT3D],
-        weights[ORIENTATION_FIELD], inv_sigma[ORIENTATION_FIELD], np.exp(pose.log_focal[0]),
-    )  # fmt: skip
+    strengths = Strengths(
+        (weights[KEYPOINT2D], inv_sigma[KEYPOINT2D]),
+        (weights[KEYPOINT3D], inv_sigma[KEYPOINT3D]),
+        (weights[ORIENTATION_FIELD], inv_sigma[ORIENTATION_FIELD]),
+        np.exp(pose.log_focal[0]),
+    )
     clear_blocks(blocks)
     ox = pose.t[0, 0]
     oy = pose.t[0, 1]
@@ -263,7 +265,7 @@ def linearize(
         t = (pose.t[i, 0], pose.t[i, 1], pose.t[i, 2])
         s = (t[0] - ox, t[1] - oy, t[2] - oz)
         cost, y, z, w, m, f = _add_points(
-            tree, terms, i, s, t, settings, pose, blocks, scratch, cost
+            tree, terms, i, s, t, strengths, pose, blocks, scratch, cost
         )
         if i > 0 and tree.S.shape[2] > 0:
             add_origin(pose.D[i], w, z, f, B, blocks.C, blocks.c, scratch)

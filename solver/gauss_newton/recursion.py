@@ -106,6 +106,58 @@ def factorize(H, n: int, diagonal) -> None:  # type: ignore[no-untyped-def]
         H[j, j] = inverse
 
 
+@expanded_kernel
+def _joint_block(T, blocks, i, s, damping):  # type: ignore[no-untyped-def]
+    """Add joint i's [H_ux | g_u | 0 | H_ubeta] to T (3, 8+W), which has UᵀM and so on, and return
+    Q by rows of its lower triangle; s (3): t_i - o.
+    """
+    H = blocks.H_uu[i]
+    B = blocks.H_u[i]
+    sx, sy, sz = s
+    if blocks.cross[0]:
+        for r in range(3):
+            for k in range(T.shape[1]):
+                T[r, k] += B[r, k]
+    else:
+        for r in range(3):
+            T[r, GRADIENT] += B[r, GRADIENT]
+    # Q = Y U + H_uu + lambda I (+ UT H_uxT)
+    q00 = T[0, 0] + T[0, 5] * -sy + T[0, 4] * sz + H[0, 0] + damping
+    q10 = T[1, 0] + T[1, 4] * sz - T[1, 5] * sy + H[1, 0]
+    q11 = T[1, 1] + T[1, 5] * sx - T[1, 3] * sz + H[1, 1] + damping
+    q20 = T[2, 0] + T[2, 4] * sz - T[2, 5] * sy + H[2, 0]
+    q21 = T[2, 1] + T[2, 5] * sx - T[2, 3] * sz + H[2, 1]
+    q22 = T[2, 2] + T[2, 3] * sy - T[2, 4] * sx + H[2, 2] + damping
+    if blocks.cross[0]:
+        q00 += B[0, 0] + sz * B[0, 4] - sy * B[0, 5]
+        q10 += B[0, 1] + sx * B[0, 5] - sz * B[0, 3]
+        q11 += B[1, 1] + sx * B[1, 5] - sz * B[1, 3]
+        q20 += B[0, 2] + sy * B[0, 3] - sx * B[0, 4]
+        q21 += B[1, 2] + sy * B[1, 3] - sx * B[1, 4]
+        q22 += B[2, 2] + sy * B[2, 3] - sx * B[2, 4]
+    return q00, q10, q11, q20, q21, q22
+
+
+@expanded_kernel
+def inverse_factor3(q):  # type: ignore[no-untyped-def]
+    """Return L^-1 with L Lᵀ = Q, both by rows of their lower triangles (6); a pivot that is not
+    positive to rounding gets 0 for its inverse, as in `factorize`.
+    """
+    q00, q10, q11, q20, q21, q22 = q
+    i00 = 1.0 / math.sqrt(q00) if q00 > 1e-290 else 0.0
+    l10 = q10 * i00
+    l20 = q20 * i00
+    d = q11 - l10 * l10
+    i11 = 1.0 / math.sqrt(d) if d > TINY * q11 else 0.0
+    l21 = (q21 - l20 * l10) * i11
+    d = q22 - l20 * l20 - l21 * l21
+    i22 = 1.0 / math.sqrt(d) if d > TINY * q22 else 0.0
+    i10 = -l10 * i00 * i11
+    i21 = -l21 * i11 * i22
+    i20 = -(l20 * i00 + l21 * i10) * i22
+    return i00, i10, i11, i20, i21, i22
+
+
 @kernel
 def eliminate(
     tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale: float, work: Workspace
@@ -130,48 +182,12 @@ def eliminate(
     oz = pose.t[0, 2]
     squares = 0.0
     for i in range(n - 1, 0, -1):
-        sx = pose.t[i, 0] - ox
-        sy = pose.t[i, 1] - oy
-        sz = pose.t[i, 2] - oz
-        s = (sx, sy, sz)
+        s = (pose.t[i, 0] - ox, pose.t[i, 1] - oy, pose.t[i, 2] - oz)
         A = work.A[i]
         T = work.Y[i]
-        H = blocks.H_uu[i]
         take_moment(A, s, T)
-        if blocks.cross[0]:
-            for r in range(3):
-                for k in range(T.shape[1]):
-                    T[r, k] += blocks.H_u[i, r, k]
-        else:
-            for r in range(3):
-                T[r, GRADIENT] += blocks.H_u[i, r, GRADIENT]
-        # Q = Y U + H_uu + lambda I (+ UT H_uxT)
-        q00 = T[0, 0] + T[0, 5] * -sy + T[0, 4] * sz + H[0, 0] + damping
-        q10 = T[1, 0] + T[1, 4] * sz - T[1, 5] * sy + H[1, 0]
-        q11 = T[1, 1] + T[1, 5] * sx - T[1, 3] * sz + H[1, 1] + damping
-        q20 = T[2, 0] + T[2, 4] * sz - T[2, 5] * sy + H[2, 0]
-        q21 = T[2, 1] + T[2, 5] * sx - T[2, 3] * sz + H[2, 1]
-        q22 = T[2, 2] + T[2, 3] * sy - T[2, 4] * sx + H[2, 2] + damping
-        if blocks.cross[0]:
-            B = blocks.H_u[i]
-            q00 += B[0, 0] + sz * B[0, 4] - sy * B[0, 5]
-            q10 += B[0, 1] + sx * B[0, 5] - sz * B[0, 3]
-            q11 += B[1, 1] + sx * B[1, 5] - sz * B[1, 3]
-            q20 += B[0, 2] + sy * B[0, 3] - sx * B[0, 4]
-            q21 += B[1, 2] + sy * B[1, 3] - sx * B[1, 4]
-            q22 += B[2, 2] + sy * B[2, 3] - sx * B[2, 4]
-        i00 = 1.0 / math.sqrt(q00) if q00 > 1e-290 else 0.0
-        l10 = q10 * i00
-        l20 = q20 * i00
-        d = q11 - l10 * l10
-        i11 = 1.0 / math.sqrt(d) if d > TINY * q11 else 0.0
-        l21 = (q21 - l20 * l10) * i11
-        d = q22 - l20 * l20 - l21 * l21
-        i22 = 1.0 / math.sqrt(d) if d > TINY * q22 else 0.0
-        i10 = -l10 * i00 * i11
-        i21 = -l21 * i11 * i22
-        i20 = -(l20 * i00 + l21 * i10) * i22
-        F = (i00, i10, i11, i20, i21, i22)
+        q = _joint_block(T, blocks, i, s, damping)
+        F = inverse_factor3(q)
         for k in range(6):
             work.L[i, k] = F[k]
         scale_rows(F, T)

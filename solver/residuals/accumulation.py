@@ -73,18 +73,25 @@ def add_to_joint(  # type: ignore[no-untyped-def]
         blocks.H_u[i, r, GRADIENT] += g[r]
 
 
+@expanded_kernel
+def shaped(rest, V, beta, k, P):  # type: ignore[no-untyped-def]
+    """Return V_k beta + rest_k of row k of two arrays, with the first P of beta."""
+    x = rest[k, 0]
+    y = rest[k, 1]
+    z = rest[k, 2]
+    for a in range(P):
+        b = beta[a]
+        x += V[k, 0, a] * b
+        y += V[k, 1, a] * b
+        z += V[k, 2, a] * b
+    return x, y, z
+
+
 @kernel
 def lever(tree, pose, k):  # type: ignore[no-untyped-def]
     """Return R_i (V_k beta + v_bar_k), from the part's origin to point k, in camera axes."""
-    x = tree.v_bar[k, 0]
-    y = tree.v_bar[k, 1]
-    z = tree.v_bar[k, 2]
-    for a in range(tree.shape_count):
-        b = pose.beta[a]
-        x += tree.V[k, 0, a] * b
-        y += tree.V[k, 1, a] * b
-        z += tree.V[k, 2, a] * b
-    return rotated(entries(pose.R[tree.point_part[k]]), (x, y, z))
+    p = shaped(tree.v_bar, tree.V, pose.beta, k, tree.shape_count)
+    return rotated(entries(pose.R[tree.point_part[k]]), p)
 
 
 @kernel
