@@ -133,14 +133,7 @@ def fit_motion(
     views = view_frames_of(body, frames)
     clock = _checked_times(times, len(views))
     states, cold = given_states(init, len(views))
-    if not as_number(window, "window") > 0.0:
-        raise InvalidValueError(
-            f"window must be a positive number of seconds, or infinite for one, but is {window}."
-        )
-    if not 0.0 <= as_number(overlap, "overlap") < window:
-        raise InvalidValueError(
-            f"The overlap of windows must lie in 0..{window} s, but is {overlap} s."
-        )
+    _check_windows(window, overlap)
     check_type(motion, MotionPrior, "motion")
     # weights of their own are given by those who know how far apart their frames are
     if _weighs_by_default(motion):
@@ -173,22 +166,35 @@ def fit_motion(
         )
         found = clip.solve(make_tree(body, focal), shape, overlapping(clock, window, overlap))
     if by_default and not has_wrong_cameras:
-        chosen = some_of(views)
-        seen = [first_view(views[k], len(tree.point_part)) for k in chosen]
-        is_told = warn_of_mirroring(
-            [view.measurements for view in seen],
-            [
-                np.asarray(view.R_camera_world) @ found.states[k].R_camera_root
-                for k, view in zip(chosen, seen, strict=True)
-            ],
-            found.cost,
-            found.measurements.sum(),
-            priors,
-            lambda m: fit_tree(tree, m, None, priors, options),
-        )
+        is_told = _warn_of_mirrored_motion(tree, views, found, priors, options)
         if not is_told and shape is None:
             warn_of_unlikely_shape([found.beta], priors)
     return found
+
+
+def _warn_of_mirrored_motion(
+    tree: Tree,
+    views: Sequence[Sequence[View]],
+    found: MotionFit,
+    priors: Priors,
+    options: Options,
+) -> bool:
+    """Warn as `warn_of_mirroring` does, of some frames of a clip; return whether there was
+    something to tell.
+    """
+    chosen = some_of(views)
+    seen = [first_view(views[k], len(tree.point_part)) for k in chosen]
+    return warn_of_mirroring(
+        [view.measurements for view in seen],
+        [
+            np.asarray(view.R_camera_world) @ found.states[k].R_camera_root
+            for k, view in zip(chosen, seen, strict=True)
+        ],
+        found.cost,
+        found.measurements.sum(),
+        priors,
+        lambda m: fit_tree(tree, m, None, priors, options),
+    )
 
 
 def _weighs_by_default(motion: MotionPrior) -> bool:
@@ -197,6 +203,17 @@ def _weighs_by_default(motion: MotionPrior) -> bool:
     """
     default = MotionPrior.root_rotation, MotionPrior.root_position
     return (motion.root_rotation, motion.root_position) == default
+
+
+def _check_windows(window: float, overlap: float) -> None:
+    if not as_number(window, "window") > 0.0:
+        raise InvalidValueError(
+            f"window must be a positive number of seconds, or infinite for one, but is {window}."
+        )
+    if not 0.0 <= as_number(overlap, "overlap") < window:
+        raise InvalidValueError(
+            f"The overlap of windows must lie in 0..{window} s, but is {overlap} s."
+        )
 
 
 def _checked_times(times: ArrayLike, frames: int) -> Array:
