@@ -29,10 +29,10 @@ from .media.video_range import VideoRange
 from .observe import Footage
 from .options import CaptureOptions
 from .solve import Solved
+from .tracking.expression_motion import CLOSED
 from .world.travel_scale import FEET, NOTHING
 from .world.world_frame import GIVEN, LINES, UP_DEVIATIONS_DEG
 
-CLOSED = 0.5  # weight of a blink above which an eye is closed
 GIVEN_FLOOR_M = 0.03  # of the floor above or below z = 0 in the world of a given path
 # With this relative deviation of the focal length or more, as of an estimate from few edges of the
 # background or none, the path of a travelling camera is unsure.

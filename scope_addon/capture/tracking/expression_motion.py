@@ -23,7 +23,7 @@ GAZE_NOISE = 0.06
 # The time in which an expression goes to rest after the face was last seen, and comes back before
 # it is seen again.
 RELEASE_S = 0.5
-CLOSED = 0.5  # weight of a blink above which the iris is not seen
+CLOSED = 0.5  # weight of a blink above which an eye is closed, and its iris not seen
 # With less light around the eyes, they are not seen; small eyes in thick frames have 0.45.
 DARK_GLASSES = 0.4
 # The time over which the median of that light is taken: a passing hand or shadow is no glasses.

@@ -100,7 +100,7 @@ class Sight:
 
     @property
     def wrist_confidence(self) -> float:
-        """Of the body's wrist."""
+        """Confidence of the body's wrist."""
         return float(self.person.keypoints_confidence[WRISTS[self.side]])
 
     @property
