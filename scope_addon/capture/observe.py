@@ -104,7 +104,7 @@ def open_trackers(
     options: CaptureOptions,
     threads: int,
     execution: Execution,
-    memory: EstimateMemory | None = None,
+    memory: EstimateMemory | None,
 ) -> Trackers:
     """Open the networks for people, and for what is captured only on request.
 

@@ -487,7 +487,7 @@ def _recorded_rate(container: InputContainer) -> float:
 
 
 def packet_rates(
-    path: Path, stated_fps: Fraction, may_have_field_packets: bool = False
+    path: Path, stated_fps: Fraction, may_have_field_packets: bool
 ) -> tuple[Fraction, Fraction]:
     """Return the frame rate that most frames of a video have, and the average one, from the times
     of its first packets, which are not decoded.

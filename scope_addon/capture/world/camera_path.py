@@ -130,7 +130,7 @@ def camera_travel(
     valid: BoolArray,
     up: FloatArray,
     times: Float64Array,
-    uneven_ground: bool = False,
+    uneven_ground: bool,
 ) -> Float64Array:
     """Return the (T, 3) displacement of the camera's centre since the first frame, metres; zeros if
     it is unknown.

@@ -60,7 +60,7 @@ def correct_depth(
     contact: FloatArray,
     T_world_camera: Float64Array,
     times: Float64Array,
-    one_floor: bool = True,
+    one_floor: bool,
 ) -> Float64Array:
     """Return the (T,) displacement of each frame's body along its root's line of sight, metres.
 

@@ -91,7 +91,7 @@ class ScaledTravel:
 
 
 def scaled_travel(
-    placed: PlacedTrack, up: FloatArray, travel: Odometry, treadmill: bool = False
+    placed: PlacedTrack, up: FloatArray, travel: Odometry, treadmill: bool
 ) -> ScaledTravel:
     """Return the camera's travel in metres. Where ``travel`` shows none, the camera stays where it
     is.

@@ -34,7 +34,7 @@ def travel(soles, center, noise=0.0, times=TIMES):
     """The travel found of a camera that is at ``center`` (T, 3) in truth."""
     noise_m = noise * np.random.default_rng(0).standard_normal(soles.shape)
     seen = soles - center[:, None] + noise_m
-    return camera_travel(seen, np.ones(len(times), bool), UP, times)
+    return camera_travel(seen, np.ones(len(times), bool), UP, times, uneven_ground=False)
 
 
 @pytest.mark.parametrize("speed", [0.8, 3.0])

@@ -38,12 +38,12 @@ def step():
     return stepping_person()
 
 
-def correction(step, shift, **more):
+def correction(step, shift, one_floor=True):
     """The correction (T,) of the depths of somebody who is shifted (T, 3) from where they are."""
     _, omega, root, place, T_world_camera, times = step
     points = place(omega, root + shift)[2]
     contact = standing.resting_probability(points, T_world_camera[2, :3], times, CAMERA)
-    return stance.correct_depth(root + shift, points, contact, T_world_camera, times, **more)
+    return stance.correct_depth(root + shift, points, contact, T_world_camera, times, one_floor)
 
 
 def test_a_wrong_depth_is_corrected_by_the_floor(step):

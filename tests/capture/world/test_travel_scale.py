@@ -95,14 +95,14 @@ def largest_error(found):
 @pytest.mark.parametrize("shortened", [1.0, 0.65])
 def test_the_floor_tells_the_scale_however_long_strides_seem(shortened):
     tilted = exp([0.1, 0.0, 0.0]) @ UP  # as the up direction of a body may be
-    found = scaled_travel(follower(shortened), tilted, travel(ROOM))
+    found = scaled_travel(follower(shortened), tilted, travel(ROOM), treadmill=False)
     assert largest_error(found) < 0.03
     assert np.degrees(np.arccos(found.floor_up @ UP)) < 1.0
     assert found.source == FLOOR
 
 
 def test_without_a_floor_the_feet_tell_it():
-    found = scaled_travel(follower(), UP, travel(WALLS))
+    found = scaled_travel(follower(), UP, travel(WALLS), treadmill=False)
     assert largest_error(found) < 0.1
     assert found.floor_up is None
     assert found.source == FEET
@@ -111,7 +111,7 @@ def test_without_a_floor_the_feet_tell_it():
 def test_a_floor_of_few_corners_tells_it_where_strides_seem_much_too_short():
     """As of somebody who comes towards the camera, whose feet hardly swing in the picture."""
     places = np.concatenate([ROOM[:16], ROOM[80:]])
-    found = scaled_travel(follower(0.4), UP, travel(places))
+    found = scaled_travel(follower(0.4), UP, travel(places), treadmill=False)
     assert found.source == FLOOR
     assert largest_error(found) < 0.03
 
@@ -119,7 +119,7 @@ def test_a_floor_of_few_corners_tells_it_where_strides_seem_much_too_short():
 def test_the_cadence_tells_it_where_strides_along_the_line_of_sight_seem_much_too_short():
     """Steps alone would tell a third to a half of it."""
     for shortened in (0.5, 0.3):
-        found = scaled_travel(follower(shortened), UP, travel(WALLS))
+        found = scaled_travel(follower(shortened), UP, travel(WALLS), treadmill=False)
         assert found.source == FEET
         assert found.center[-1, 2] == pytest.approx(CENTER[-1, 2], rel=0.25)
 
@@ -135,7 +135,7 @@ def test_people_walk_as_fast_as_their_cadence_tells():
 def test_a_scale_that_nobody_tells_is_said_to_be_unknown():
     unseen = follower()
     unseen.valid[:] = False
-    found = scaled_travel(unseen, UP, travel(WALLS))
+    found = scaled_travel(unseen, UP, travel(WALLS), treadmill=False)
     assert found.source == NOTHING
     np.testing.assert_array_equal(found.center, 0.0)
 
