@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import VideoError
-from .process import WARM_UP_FIELDS, WorkerFailedError, WorkerProcess, is_number, is_side
+from .process import PROGRESS_FIELDS, WorkerFailedError, WorkerProcess, is_number, is_side
 from .request import PictureRequest
 
 LONGER_SIDE = 1280  # pixels, of what is written
@@ -66,8 +66,7 @@ def write_picture(request: PictureRequest, job_folder: Path, send: Callable[...,
 class PictureProcess(WorkerProcess):
     """The process for one frame. Call ``answer`` regularly; ``close`` ends it at once."""
 
-    fields = {
-        "progress": WARM_UP_FIELDS["progress"],
+    fields = PROGRESS_FIELDS | {
         "result": {
             "shown_width": is_side,
             "shown_height": is_side,

@@ -23,7 +23,7 @@ from pathlib import Path
 from ..errors import UsageError, VideoError
 from ..live.system_cameras import camera_names, camera_with_modes, described
 from ..temporary import temporary_folder
-from .process import START_SCRIPT, WARM_UP_FIELDS, WorkerFailedError, WorkerProcess
+from .process import PROGRESS_FIELDS, START_SCRIPT, WorkerFailedError, WorkerProcess
 from .request import FormatsRequest
 
 NAMES = Path("/sys/class/video4linux")
@@ -206,10 +206,7 @@ def _are_formats(value: object) -> bool:
 class FormatsProcess(WorkerProcess):
     """The question to one camera. Call ``answer`` regularly; ``close`` ends the process at once."""
 
-    fields = {
-        "progress": WARM_UP_FIELDS["progress"],
-        "result": {"name": _is_shown, "formats": _are_formats},
-    }
+    fields = PROGRESS_FIELDS | {"result": {"name": _is_shown, "formats": _are_formats}}
 
     def __init__(
         self, source: str, job_folder: Path, python: Sequence[str], script: Path = START_SCRIPT

@@ -102,11 +102,11 @@ def is_figure(value: object) -> bool:
 
 # The fields that a message must have, by its event, and what they may be.
 Fields = dict[str, dict[str, Callable[[object], bool]]]
-WARM_UP_FIELDS: Fields = {
+PROGRESS_FIELDS: Fields = {
     "progress": {"stage": is_text, "done": is_number, "total": is_number},
-    "result": {},
 }
-CAPTURE_FIELDS: Fields = WARM_UP_FIELDS | {
+WARM_UP_FIELDS: Fields = PROGRESS_FIELDS | {"result": {}}
+CAPTURE_FIELDS: Fields = PROGRESS_FIELDS | {
     "preview": {"file": _is_name, "width": is_side, "height": is_side, "frame": is_number},
     "result": {"motions": _are_names, "report": _is_report},
 }
@@ -162,9 +162,6 @@ ROOT = Path(__file__).resolve().parents[2]
 START_SCRIPT = Path(__file__).with_name("start_worker.py")
 LOG = "worker.log"
 _LAST = ("result", "ended")  # events after which a worker ends
-_WINDOWS_FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(
-    subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0
-)
 
 
 class WorkerProcess:
@@ -196,6 +193,9 @@ class WorkerProcess:
         self.job_folder = job_folder
         self.finished = False
         self._fields = self.fields if request else WARM_UP_FIELDS
+        # only Windows has these; elsewhere, the worker lowers its priority itself
+        priority = "BELOW_NORMAL_PRIORITY_CLASS" if request else "IDLE_PRIORITY_CLASS"
+        windows_flags = sum(getattr(subprocess, n, 0) for n in ("CREATE_NO_WINDOW", priority))
         command, environment = worker_command(python, ROOT, job_folder, kernels, script)
         try:
             with (job_folder / LOG).open("wb") as log:
@@ -205,7 +205,7 @@ class WorkerProcess:
                     stdout=subprocess.PIPE,
                     stderr=log,
                     env=environment,
-                    creationflags=_WINDOWS_FLAGS,
+                    creationflags=windows_flags,
                 )
         except OSError as error:
             discard(job_folder)

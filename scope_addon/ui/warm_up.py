@@ -19,26 +19,24 @@ import bpy
 from bpy.types import UILayout
 
 from ..machine_code.kernel_count import kernel_count
-from ..temporary import discard, new_folder
+from ..temporary import new_folder
 from .preferences import PACKAGE, cache, preferences, python_command
 from .reporting import iface_
 from .viewports import redraw_sidebars
 
 if TYPE_CHECKING:
-    import subprocess
+    from ..job.process import WorkerProcess
 
 ROOT = Path(__file__).resolve().parents[2]
 _DELAY_S = 3.0
 _INTERVAL_S = 1.0
-_REQUEST = b'{"warm_up": true}\n'
 
 
 class WarmUp:
-    """The process that compiles; ``process`` is None while there is none."""
+    """The process that compiles; ``worker`` is None while there is none."""
 
-    process: subprocess.Popen[bytes] | None = None
+    worker: WorkerProcess | None = None
     files_before = 0  # of compiled code, when it began
-    folder: Path | None = None
 
 
 def attach() -> None:
@@ -59,73 +57,58 @@ def step() -> float | None:
     """Start the process, or see whether it has ended; return in how many seconds to call again. A
     timer calls this.
     """
-    if WarmUp.process is None:
+    if WarmUp.worker is None:
         if is_compiled() or not start():
             return None
-    elif WarmUp.process.poll() is not None:
-        if WarmUp.process.returncode == 0:
-            with contextlib.suppress(OSError):
-                _marker().touch()
+    elif has_ended(WarmUp.worker):
         stop()
     # the panel alone: drawing a viewport without a graphics card takes a fifth of a second
     redraw_sidebars()
-    return _INTERVAL_S if WarmUp.process else None
+    return _INTERVAL_S if WarmUp.worker else None
 
 
 def start() -> bool:
     """Start the process; return whether that worked. If not, the first capture compiles the
     solver.
     """
-    import subprocess
+    from ..errors import SetupError
+    from ..job.process import WorkerProcess
 
-    from ..job.start_worker import worker_command
-
-    windows_flags = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(
-        subprocess, "IDLE_PRIORITY_CLASS", 0
-    )
     kernels = cache().kernels
     try:
         kernels.mkdir(parents=True, exist_ok=True)
         WarmUp.files_before = _files()
-        WarmUp.folder = new_folder("warm-up")
-        command, environment = worker_command(python_command(), ROOT, WarmUp.folder, kernels)
-        quiet = subprocess.DEVNULL
-        WarmUp.process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=quiet,
-            stderr=quiet,
-            env=environment,
-            creationflags=windows_flags,
-        )
-        assert WarmUp.process.stdin is not None
-        WarmUp.process.stdin.write(_REQUEST)  # it stays open: the process ends when Blender does
-        WarmUp.process.stdin.flush()
-    except OSError:
-        stop()
+        WarmUp.worker = WorkerProcess(None, new_folder("warm-up"), kernels, python_command())
+    except (OSError, SetupError):
         return False
     return True
 
 
+def has_ended(worker: WorkerProcess) -> bool:
+    """Return whether the process has ended, and note it if everything is compiled."""
+    from ..job.process import WorkerFailedError
+
+    try:
+        worker.poll()
+    except WorkerFailedError:
+        return True
+    if worker.finished:
+        with contextlib.suppress(OSError):
+            _marker().touch()
+    return worker.finished
+
+
 def stop() -> None:
     """End the process. What it has compiled is kept."""
-    process = WarmUp.process
-    folder = WarmUp.folder
-    WarmUp.process = WarmUp.folder = None
-    if process is not None:
-        if process.poll() is None:
-            process.kill()
-        process.wait()
-        if process.stdin is not None:
-            with contextlib.suppress(OSError):
-                process.stdin.close()
-    if folder is not None:
-        discard(folder)
+    worker = WarmUp.worker
+    WarmUp.worker = None
+    if worker is not None:
+        worker.close()
 
 
 def draw(layout: UILayout) -> None:
     """Show the progress while the solver is being compiled."""
-    if WarmUp.process is not None and (compiled := _files() - WarmUp.files_before) > 0:
+    if WarmUp.worker is not None and (compiled := _files() - WarmUp.files_before) > 0:
         share = min(1.0, compiled / kernel_count())
         text = iface_("Compiling the solver: {percent:.0f} %", percent=100 * share)
         layout.progress(text=text, factor=share)

@@ -9,7 +9,7 @@ from unittest.mock import MagicMock
 
 import bpy
 import pytest
-from scope.scope_addon.job import start_worker
+from scope.scope_addon.job import process as job_process
 from scope.scope_addon.machine_code.kernel_count import kernel_count
 from scope.scope_addon.ui import warm_up
 from scope.scope_addon.ui.preferences import cache
@@ -21,9 +21,17 @@ from ..job.processes import wait_for
 def process(tmp_path, monkeypatch):
     """Replace what the process runs."""
 
+    worker_command = job_process.worker_command
+
     def use(code):
         monkeypatch.setattr(
-            start_worker, "worker_command", lambda *_: ([sys.executable, "-c", code], None)
+            job_process,
+            "worker_command",
+            lambda python, root, folder, *rest: (
+                ([sys.executable, "-c", code], None)
+                if folder.name.startswith("warm-up")
+                else worker_command(python, root, folder, *rest)
+            ),
         )
 
     yield use
@@ -35,7 +43,10 @@ def wait_for_end():
 
 
 def test_it_runs_once_for_an_installation(process, tmp_path):
-    process(f"import sys; open({str(tmp_path / 'said')!r}, 'a').write(sys.stdin.readline())")
+    process(
+        f"import sys; open({str(tmp_path / 'said')!r}, 'a').write(sys.stdin.readline()); "
+        'print(\'{"event": "result"}\')'
+    )
     for _ in range(3):
         wait_for_end()
     assert (tmp_path / "said").read_text("utf-8") == '{"warm_up": true}\n'
@@ -80,21 +91,21 @@ def test_after_a_failure_it_runs_again(process, tmp_path):
 def test_it_ends_with_the_extension(process):
     process("import time; time.sleep(600)")
     assert warm_up.step() is not None
-    running = warm_up.WarmUp.process
-    assert running.poll() is None
+    running = warm_up.WarmUp.worker
+    assert running.alive
     warm_up.detach()
-    assert running.poll() is not None
+    assert not running.alive
 
 
 def test_a_capture_ends_it_for_good(process, fake_worker, footage):
     process("import time; time.sleep(600)")
     fake_worker("finish()")
     assert warm_up.step() is not None
-    running = warm_up.WarmUp.process
+    running = warm_up.WarmUp.worker
     bpy.app.timers.register(warm_up.step, first_interval=100.0)  # as attach() does
     bpy.context.scene.scope.footage = str(footage)
     assert bpy.ops.scope.capture() == {"FINISHED"}
-    assert running.poll() is not None
+    assert not running.alive
     # which would begin again, beside the capture
     assert not bpy.app.timers.is_registered(warm_up.step)
 
