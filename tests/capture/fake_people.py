@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES, PoseEstimate
-from scope.scope_addon.capture.perception.person_detector import Detection
+from scope.scope_addon.capture.perception.person_detector import Detection, Search
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
 
@@ -110,10 +110,7 @@ class FakeDetector:
                 found.append(Detection(0.95, np.zeros(4), points))
         return found
 
-    def detect_small(self, image: np.ndarray) -> list[Detection]:
-        return []
-
-    def detect_in_parts(self, image: np.ndarray) -> list[Detection]:
+    def detect_smaller(self, image: np.ndarray, search: Search) -> list[Detection]:
         return []
 
     def detect_turned(self, image: np.ndarray) -> list[Detection]:

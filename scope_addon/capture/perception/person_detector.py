@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -23,14 +24,6 @@ _SCORE_LIMIT = 100.0
 _SURE_SCORE = 0.8
 _SQUARES_FROM = 1.2  # aspect ratio from which squares show people larger
 _SMALL_SCORE = 0.8  # least score of a small person: more squares hold more that resembles a person
-# The side of the squares in which small people are looked for, in shorter sides of the image.
-_SMALL_SIDE = 1 / 3
-# The largest step from one square to the next, in sides; the rest holds such a person's height.
-_SMALL_STEP = 0.6
-# The side of those in which people are looked for beside larger ones, in shorter sides of the
-# image.
-_PART_SIDE = 0.6
-_PART_STEP = 2 / 3  # the same for these
 # Detections of one person differ by at most this much at the shoulders, in sides of the region.
 # People who stand side by side are about twice as far apart.
 SAME_SHOULDERS = 0.08
@@ -40,6 +33,22 @@ _NEAR_HIPS = 0.25
 _PARALLEL = 0.5
 # How much smaller the region of somebody in a crowd is, so that it shows less of the others.
 _CROWDED_SIDE = 0.85
+
+
+class Search(NamedTuple):
+    """Squares of an image in which people are looked for whom it shows too small; each takes as
+    long as the whole image.
+    """
+
+    side: float  # in shorter sides of the image
+    step: float  # the largest to the next one, in sides; the rest holds such a person's height
+
+
+# For people of about a fifth to two fifths of the shorter side, four to eight squares: beside
+# somebody larger, their scores are low even in an image that shows them large enough.
+IN_PARTS = Search(side=0.6, step=2 / 3)
+# For people of about a tenth to a quarter of the shorter side, some thirty to fifty squares.
+FOR_SMALL = Search(side=1 / 3, step=0.6)
 
 
 @dataclass(frozen=True)
@@ -130,27 +139,9 @@ class PersonDetector:
             found = unique(found + self._detect_in_squares(image_rgb, around, SCORE_THRESHOLD))
         return found
 
-    def detect_small(self, image_rgb: Uint8Array) -> list[Detection]:
-        """Detect people of about a tenth to a quarter of the shorter side, whom `detect` misses,
-        best first.
-
-        Searches some thirty to fifty squares of an (H, W, 3) uint8 RGB image, and takes as many
-        times as long as `detect` takes for the whole image.
-        """
-        height, width = image_rgb.shape[:2]
-        grid = grid_of_squares(height, width, _SMALL_SIDE, _SMALL_STEP)
-        return unique(self._detect_in_squares(image_rgb, grid, _SMALL_SCORE))
-
-    def detect_in_parts(self, image_rgb: Uint8Array) -> list[Detection]:
-        """Detect people of about a fifth to two fifths of the shorter side, whom `detect` misses,
-        best first.
-
-        Beside somebody larger, their scores are low even in an image that shows them large enough.
-        Searches some four to eight squares of an (H, W, 3) uint8 RGB image, and takes as many times
-        as long as `detect` takes for the whole image.
-        """
-        height, width = image_rgb.shape[:2]
-        grid = grid_of_squares(height, width, _PART_SIDE, _PART_STEP)
+    def detect_smaller(self, image_rgb: Uint8Array, search: Search) -> list[Detection]:
+        """Detect people whom `detect` misses in an (H, W, 3) uint8 RGB image, best first."""
+        grid = grid_of_squares(*image_rgb.shape[:2], search.side, search.step)
         return unique(self._detect_in_squares(image_rgb, grid, _SMALL_SCORE))
 
     def detect_turned(self, image_rgb: Uint8Array) -> list[Detection]:

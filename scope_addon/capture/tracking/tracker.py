@@ -23,7 +23,7 @@ from ...arrays import Uint8Array
 from ..perception.adapters.keypoint_network import KeypointNetwork
 from ..perception.landmark_network import SHOULDERS, EstimateMemory, LandmarkNetwork, PoseEstimate
 from ..perception.observation import Observation, PendingReference, PersonMask
-from ..perception.person_detector import Detection, possible_regions
+from ..perception.person_detector import FOR_SMALL, IN_PARTS, Detection, possible_regions
 from ..perception.region import MARGIN, Crop, Region, bounds
 from ..perception.sessions import Execution
 from .appearance import appearance
@@ -403,14 +403,12 @@ class PeopleTracker:
             self._estimate_detected(image_rgb, turned, math.inf),
         )
         if self._schedule.begin_thorough(self._live):
-            self._start_detected(
-                image_rgb, self._networks.detector.detect_in_parts(image_rgb), SURE_SCORE
-            )
+            beside_larger = self._networks.detector.detect_smaller(image_rgb, IN_PARTS)
+            self._start_detected(image_rgb, beside_larger, SURE_SCORE)
             self._search_behind(image_rgb)
         if self._schedule.begin_small(image_rgb, self._live, self._lost):
-            self._start_detected(
-                image_rgb, self._networks.detector.detect_small(image_rgb), math.inf
-            )
+            small = self._networks.detector.detect_smaller(image_rgb, FOR_SMALL)
+            self._start_detected(image_rgb, small, math.inf)
 
     def _search_behind(self, image_rgb: Uint8Array) -> None:
         """Start a tracklet for everybody who is seen once those who are tracked are removed."""

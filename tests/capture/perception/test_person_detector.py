@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.person_detector import (
+    FOR_SMALL,
+    IN_PARTS,
     Detection,
     PersonDetector,
     grid_of_squares,
@@ -120,7 +122,7 @@ def test_a_small_person_is_found_in_the_small_squares_alone(
     (person,) = detector.detect(image)
     distant = distant_view(image)
     assert detector.detect(distant, closely=True) == []
-    (small,) = detector.detect_small(distant)
+    (small,) = detector.detect_smaller(distant, FOR_SMALL)
     expected = (person.points_px[:2] + 0.5) / 8 - 0.5 + [400, 200]
     assert np.abs(small.points_px[:2] - expected).max() < 0.05 * person.region.side_px / 8
 
@@ -136,9 +138,8 @@ def test_a_small_person_beside_a_larger_one_is_found_in_the_parts_alone(
     assert other.points_px[0, 0] < 576
     scale = 180 / small.shape[0]
     expected = (person.points_px[:2] + 0.5) * scale - 0.5 + [800, 200]
-    off = [
-        np.abs(found.points_px[:2] - expected).max() for found in detector.detect_in_parts(image)
-    ]
+    others = detector.detect_smaller(image, IN_PARTS)
+    off = [np.abs(found.points_px[:2] - expected).max() for found in others]
     assert min(off) < 0.05 * person.region.side_px * scale
     assert len(off) == 2
 
@@ -184,7 +185,7 @@ def test_finds_both_people(
 
 def test_no_detections_in_a_blank_image(detector: PersonDetector) -> None:
     blank = np.full((90, 160, 3), 128, np.uint8)
-    assert detector.detect(blank) == detector.detect_in_parts(blank) == []
+    assert detector.detect(blank) == detector.detect_smaller(blank, IN_PARTS) == []
 
 
 @pytest.mark.parametrize("quarter_turns", [1, 2, 3])

@@ -17,7 +17,7 @@ import numpy as np
 
 from .....solver.errors import ModelFileError
 from ....arrays import Float64Array, Uint8Array
-from ..person_detector import Detection, overlap_clusters
+from ..person_detector import Detection, Search, overlap_clusters
 from ..region import fit_in
 from ..sessions import Execution
 from .description import Description, description_path, read_description
@@ -243,14 +243,10 @@ class BoxDetector:
         corners = fitted.to_image(kept.corners.reshape(-1, 2, 2)).reshape(-1, 4)
         return [box_detection(float(s), box) for s, box in zip(kept.scores, corners, strict=True)]
 
-    def detect_small(self, image_rgb: Uint8Array) -> list[Detection]:
+    def detect_smaller(self, image_rgb: Uint8Array, search: Search) -> list[Detection]:
         """Return nothing for any (H, W, 3) image: how small people may be is a property of the
         user's network.
         """
-        return []
-
-    def detect_in_parts(self, image_rgb: Uint8Array) -> list[Detection]:
-        """Return nothing for any (H, W, 3) image, as `detect_small`."""
         return []
 
     def detect_turned(self, image_rgb: Uint8Array) -> list[Detection]:
