@@ -385,8 +385,7 @@ class Motion:
         path = Path(path)
         data = read_npz(path, MotionFileError, "motion file", content)
         known = {f.name for f in fields(cls)} - set(_GROUPS)
-        missing = sorted(known - set(data) - OPTIONAL_KEYS)
-        if missing:
+        if missing := sorted(REQUIRED_KEYS - set(data)):
             raise MotionFileError(
                 f"{path} lacks {', '.join(missing)}: it is not a motion file of this version"
             )
@@ -456,7 +455,7 @@ CORRECTION_KEYS = (
     "uncorrected_joints_cam",
     "uncorrected_world_from_camera",
 )
-# Not in files of earlier versions; NaN where nothing is known.
+# NaN where nothing is known
 SIGMA_KEYS = ("joint_sigma_m", "joint_sigma_depth_m")
 _Schema = dict[str, tuple[tuple[str | int, ...], type]]
 # Only in files of captures that looked for the face: the first are what it expresses, the others
@@ -483,20 +482,7 @@ _VIEW_SCHEMA: _Schema = {
 }
 VIEW_KEYS = tuple(_VIEW_SCHEMA)
 _GROUPS = ("corrections", "face", "views")  # fields that are not keys themselves
-OPTIONAL_KEYS = {
-    "source",
-    *SIGMA_KEYS,
-    "height_sigma_m",
-    "uneven_ground",
-    "footage_rotation",
-    "footage_mirrored",
-    "footage_speed",
-    "zoom",
-    "scene_starts",
-    *CORRECTION_KEYS,
-    *FACE_KEYS,
-    *VIEW_KEYS,
-}
+REQUIRED_KEYS = {f.name for f in fields(Motion)} - {*_GROUPS, "zoom", "scene_starts"}
 _SCHEMA: _Schema = {
     "poses": (("T", "3K1"), np.float32),
     "trans": (("T", 3), np.float32),
@@ -523,4 +509,3 @@ _SCHEMA: _Schema = {
     "joint_sigma_depth_m": (("T", "K1"), np.float32),
     "scene_starts": (("M",), np.int64),
 }
-REQUIRED_KEYS = set(_SCHEMA) - OPTIONAL_KEYS

@@ -137,17 +137,14 @@ def test_a_camera_that_none_can_be_is_an_error(tmp_path, key, value):
         Motion.load(tmp_path / "a.npz")
 
 
-def test_files_of_earlier_versions_have_unknown_deviations(tmp_path):
+def test_a_file_that_lacks_what_every_motion_has_is_an_error(tmp_path):
     make_motion().save(tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz") as file:
-        np.savez(
-            tmp_path / "old.npz", **{key: file[key] for key in file.files if "sigma" not in key}
-        )
-    old = Motion.load(tmp_path / "old.npz")
-    assert old.joint_sigma_m.shape == old.joint_sigma_depth_m.shape == old.joint_confidence.shape
-    assert np.isnan(old.joint_sigma_m).all()
-    assert np.isnan(old.joint_sigma_depth_m).all()
-    assert np.isnan(old.height_sigma_m)
+        arrays = dict(file)
+    for name in arrays:
+        np.savez(tmp_path / "b.npz", **{key: arrays[key] for key in arrays if key != name})
+        with pytest.raises(MotionFileError, match=rf"b\.npz lacks {name}: "):
+            Motion.load(tmp_path / "b.npz")
 
 
 def test_an_unwritable_folder_is_an_output_error_and_keeps_the_earlier_file(tmp_path):

@@ -10,7 +10,6 @@ copies a text, and undo stores it again only if it changes.
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 
 import bpy
@@ -23,8 +22,7 @@ from ..motion import Motion
 from ..scene_gaps import with_scene_gaps
 from .stored_values import start_frame
 
-# property of the armature: the text, or the path of a motion file in older .blend files
-MOTION = "scope_motion"
+MOTION = "scope_motion"  # property of the armature: the text
 _CONTENT = "motion"  # property of the text: bytes of the motion file
 # property of the text: bytes of ``character/uncorrected_keys.py``
 _KEYS = "uncorrected_keys"
@@ -74,12 +72,8 @@ def stored_motion(armature: Object) -> Motion:
                 f"{name} has {len(content) >> 20} MiB, too much for a motion; capture again"
             )
         return Motion.load(name, content)
-    # False, and no error, for any text that is no name
-    if isinstance(stored, str) and os.path.isfile(stored):
-        return Motion.load(stored)
     raise UsageError(
-        f"the captured motion of '{armature.name}' is stored neither in this .blend file nor in "
-        "the cache; capture the "
+        f"the captured motion of '{armature.name}' is not stored in this .blend file; capture the "
         "footage again, or import its .npz file"
     )
 

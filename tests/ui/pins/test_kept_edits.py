@@ -199,9 +199,9 @@ def test_where_the_motion_is_lost_an_edit_changes_the_keys_only(rig):
         edit()
         assert holds(rig), name
     assert kinds(rig) == []
-    with pytest.raises(RuntimeError, match="neither in this .blend file nor in the cache"):
+    with pytest.raises(RuntimeError, match="is not stored in this .blend file"):
         bpy.ops.scope.exchange_sides(start=62, end=70)
-    with pytest.raises(RuntimeError, match="neither in this .blend file nor in the cache"):
+    with pytest.raises(RuntimeError, match="is not stored in this .blend file"):
         bpy.ops.scope.smooth(strength=1.0)
 
 
