@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from .notices import Notice, notices_of
+from .notices import Notice, notice_from
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,8 @@ class Report:
     def from_json(cls, content: Mapping[str, Any]) -> Report:
         """Read a report, which may lack anything, and have more."""
         figures = {each.name: content[each.name] for each in fields(cls) if each.name in content}
-        return cls(**{**figures, "warnings": notices_of(content)})
+        warnings = [notice_from(record) for record in content.get("notices", ())]
+        return cls(**{**figures, "warnings": warnings})
 
 
 def warnings_as_json(warnings: Sequence[Notice]) -> dict[str, Any]:

@@ -348,33 +348,15 @@ def notice(code: str, **values: Value) -> Notice:
     return Notice(code, values)
 
 
-def notice_from(record: object, sentence: str, written: Callable[[Notice], str] = str) -> Notice:
-    """Return the notice that another version or process has recorded beside its sentence.
-
-    :param record: as of ``Notice.as_json``; anything else, or a record that does not make the
-        sentence, gives a notice that says the sentence alone.
-    :param written: how the sentence was written.
+def notice_from(record: object) -> Notice:
+    """Return the notice of a record as of ``Notice.as_json``. Of anything else, and of a record
+    that makes no sentence, it says that it is damaged.
     """
-    if isinstance(record, Mapping):
-        code = record.get("code")
-        values = record.get("values")
-        if isinstance(code, str) and isinstance(values, Mapping):
-            found = Notice(code, dict(values))
-            with suppress(KeyError, ValueError, TypeError, AttributeError):
-                if written(found) == sentence:
-                    return found
-    return notice(OTHER, text=sentence)
-
-
-def notices_of(report: Mapping[str, Any]) -> list[Notice]:
-    """Return the notices of a report as JSON has it: their sentences are its ``warnings``, their
-    records its ``notices``, which may be missing.
-    """
-    sentences = [str(sentence) for sentence in report.get("warnings", ())]
-    records = report.get("notices")
-    if not isinstance(records, list) or len(records) != len(sentences):
-        records = [None] * len(sentences)
-    return [notice_from(*each) for each in zip(records, sentences, strict=True)]
+    with suppress(KeyError, ValueError, TypeError, AttributeError, OverflowError):
+        found = Notice(record["code"], dict(record["values"]))  # type: ignore[index]
+        str(found)
+        return found
+    return notice(OTHER, text="a warning of this result is damaged; capture again to see it")
 
 
 def _written(value: Value, spec: str, translate: Translate) -> list[str | TimeText]:

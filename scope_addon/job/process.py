@@ -71,13 +71,11 @@ def _is_report(value: object) -> bool:
     """Whether it is a report, all of which that the panel uses has its type."""
     if not isinstance(value, dict):
         return False
-    warnings = value.get("warnings", [])
+    notices = value.get("notices", [])
     rates = value.get("fps", {})
     people = value.get("per_person", [])
-    if not isinstance(warnings, list) or not isinstance(rates, dict):
-        return False
     views = value.get("views", [])
-    if not _are_records(people) or not _are_records(views):
+    if not isinstance(rates, dict) or not all(map(_are_records, (notices, people, views))):
         return False
     heights = [person["height_m"] for person in people if "height_m" in person]
     sigmas = [person.get("height_sigma_m") for person in people]
@@ -85,7 +83,6 @@ def _is_report(value: object) -> bool:
     texts = [value.get(name, "") for name in ("camera", "execution")]
     return (
         all(map(is_figure, [*rates.values(), *heights, *known_sigmas]))
-        and all(isinstance(text, str) for text in warnings)
         and all(is_text(text) and is_utf8(text) for text in texts)
         and all(type(view.get("is_used")) is bool for view in views)
     )

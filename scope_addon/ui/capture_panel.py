@@ -444,11 +444,15 @@ def _clear_message(_settings: PropertyGroup, _context: Context) -> None:
     state.message = ""
 
 
+def _english_text(stored: PropertyGroup) -> str:
+    return warning_text(stored_warning(stored), str)
+
+
 class SCOPE_PG_warning(PropertyGroup):
     """A warning about the result."""
 
-    text: StringProperty()  # in English
-    record: StringProperty()  # JSON of the notice, from which it is shown in other languages
+    record: StringProperty()  # JSON of the notice
+    text: StringProperty(get=_english_text)
     spans: StringProperty()  # scene frames; see `stored_values`
 
 

@@ -141,22 +141,19 @@ def _missing() -> list[str]:
 
 
 def add_warning(shown: PropertyGroup, warning: Notice, spans: Sequence[FrameSpan] = ()) -> None:
-    """Store a warning with a result: its English text, and the record from which it is shown in the
-    user's language.
-    """
+    """Store a warning with a result."""
     import json
 
     stored = shown.warnings.add()
-    stored.text = warning_text(warning, str)
     stored.record = json.dumps(warning.as_json())
     stored.spans = spans_text(spans)
 
 
 def stored_warning(stored: PropertyGroup) -> Notice:
-    """Return a warning of a result. Of one whose record is damaged or missing, the text is left."""
+    """Return a warning of a result."""
     import json
 
     record = None
     with suppress(ValueError, RecursionError):
         record = json.loads(stored.record)
-    return notice_from(record, stored.text, lambda found: warning_text(found, str))
+    return notice_from(record)

@@ -195,7 +195,10 @@ def replies(_: Path) -> list[bytes]:
             {
                 "event": "result",
                 "motions": ["person1.npz"],
-                "report": {"fps": {"total": 9.5}, "warnings": ["dark"]},
+                "report": {
+                    "fps": {"total": 9.5},
+                    "notices": [{"code": "other", "values": {"text": "dark"}}],
+                },
             },
             {"event": "error", "message": "the footage is too short"},
         ]

@@ -57,7 +57,7 @@ PREVIEW = {"event": "preview", "file": "preview.rgba", "width": 320, "height": 1
 RESULT = {
     "event": "result",
     "motions": ["person1.npz"],
-    "report": {"fps": {"total": 9.5}, "warnings": ["dark"]},
+    "report": {"fps": {"total": 9.5}, "notices": [{"code": "other"}]},
 }
 
 
@@ -100,7 +100,7 @@ def test_what_is_no_message_is_ignored(text):
         (RESULT, {"motions": []}),
         (RESULT, {"motions": ["person1.pkl"]}),
         (RESULT, {"report": None}),
-        (RESULT, {"report": {"warnings": [1]}}),
+        (RESULT, {"report": {"notices": [1]}}),
         (RESULT, {"report": {"fps": 3}}),
         (RESULT, {"report": {"fps": {"total": float("nan")}}}),
         (RESULT, {"report": {"per_person": 7}}),

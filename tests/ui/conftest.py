@@ -172,7 +172,9 @@ def fake_worker(tmp_path, monkeypatch, standing):
                     for name in names:
                         shutil.copy({str(tmp_path / "standing.npz")!r}, os.path.join(folder, name))
                     report = {{"people": 1, "reprojection_px": 2.5, "fps": {{"total": 5.0}}}}
-                    report["warnings"] = list(warnings)
+                    report["notices"] = [
+                        {{"code": "other", "values": {{"text": text}}}} for text in warnings
+                    ]
                     send("result", motions=names, report=report)
             """)
             + textwrap.dedent(body)
