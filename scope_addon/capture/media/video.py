@@ -405,11 +405,11 @@ def _sampling_notices(footage: str, fps: Fraction, wanted_fps: Fraction) -> list
     found = []
     sampled_fps = min(wanted_fps, fps)
     even_fps = fps / round(fps / sampled_fps)
-    rates = {"footage": footage, "rate": float(fps), "wanted": float(wanted_fps)}
+    rates = {"rate": float(fps), "wanted": float(wanted_fps)}
     if _varies(sampled_fps, even_fps):
-        found.append(notice("uneven_frames", **rates, even=float(even_fps)))
+        found.append(notice("uneven_frames", footage=footage, **rates, even=float(even_fps)))
     if wanted_fps > fps:
-        found.append(notice("frame_rate_above_footage", **rates))
+        found.append(notice("frame_rate_above_footage", footage=footage, **rates))
     return found
 
 

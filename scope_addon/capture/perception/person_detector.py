@@ -141,7 +141,8 @@ class PersonDetector:
 
     def detect_smaller(self, image_rgb: Uint8Array, search: Search) -> list[Detection]:
         """Detect people whom `detect` misses in an (H, W, 3) uint8 RGB image, best first."""
-        grid = grid_of_squares(*image_rgb.shape[:2], search.side, search.step)
+        height, width = image_rgb.shape[:2]
+        grid = grid_of_squares(height, width, search.side, search.step)
         return unique(self._detect_in_squares(image_rgb, grid, _SMALL_SCORE))
 
     def detect_turned(self, image_rgb: Uint8Array) -> list[Detection]:
