@@ -35,7 +35,7 @@ _ROWS = 256  # that are converted at a time
 
 
 @dataclass(frozen=True)
-class Picture:
+class StillImage:
     """``rgb`` (H, W, 3) uint8; ``focal_35mm`` in mm on a 36 × 24 mm frame; ``length`` more than 1
     for an animation.
     """
@@ -68,7 +68,7 @@ def is_picture(path: Path) -> bool:
     return False
 
 
-def read_picture(path: Path) -> Picture | None:
+def read_picture(path: Path) -> StillImage | None:
     """Decode a picture; None if that fails. Transparent parts become white, except in AVIF and
     HEIC.
 
@@ -98,7 +98,7 @@ def read_picture(path: Path) -> Picture | None:
     rgb = _as_rgb8(image)
     if not data.startswith(TIFF):  # OpenCV rotates a TIFF upright even with IMREAD_UNCHANGED
         rgb = exif.view.show(rgb)
-    return Picture(rgb, exif.focal_35mm, animation_length(data))
+    return StillImage(rgb, exif.focal_35mm, animation_length(data))
 
 
 def _is_for_opencv(head: bytes) -> bool:
@@ -125,7 +125,7 @@ def _brands(head: bytes) -> set[bytes]:
     return {head[at : at + 4] for at in (8, *range(16, size - 3, 4))}
 
 
-def _read_heif(path: Path, data: bytes) -> Picture | None:
+def _read_heif(path: Path, data: bytes) -> StillImage | None:
     layout = read_layout(data)
     if layout is None:
         return None
@@ -134,7 +134,7 @@ def _read_heif(path: Path, data: bytes) -> Picture | None:
         return None
     check_size(path, whole.shape[1], whole.shape[0])
     length = max(1, sequence_length(path))
-    return Picture(whole, read_exif(layout.exif).focal_35mm, length)
+    return StillImage(whole, read_exif(layout.exif).focal_35mm, length)
 
 
 def _as_rgb8(image: NDArray[Any]) -> Uint8Array:
