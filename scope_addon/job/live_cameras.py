@@ -12,16 +12,16 @@ from __future__ import annotations
 
 import os
 import re
-import struct
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import UsageError, VideoError
 from ..live.system_cameras import camera_names, camera_with_modes, described
+from ..live.video4linux import MAX_FORMATS, delivers_images, pixel_formats
 from ..temporary import temporary_folder
 from .process import PROGRESS_FIELDS, START_SCRIPT, WorkerFailedError, WorkerProcess
 from .request import FormatsRequest
@@ -30,19 +30,6 @@ NAMES = Path("/sys/class/video4linux")
 DEVICES = Path("/dev")
 LONGEST_NAME = 60  # characters
 _MAX_CAMERAS = 64
-_MAX_FORMATS = 16
-_MAX_SIZES = 64
-# Of linux/videodev2.h: the requests, the structures' layouts, and the two constants that are
-# needed.
-_QUERYCAP = 0x80685600
-_ENUM_FMT = 0xC0405602
-_ENUM_FRAMESIZES = 0xC02C564A
-_CAPABILITY = "16s32s32sIII12x"
-_FORMAT = "III32sI16x"
-_SIZE = "III6I8x"
-_CAPTURE = 1  # V4L2_CAP_VIDEO_CAPTURE and V4L2_BUF_TYPE_VIDEO_CAPTURE
-_DISCRETE = 1  # V4L2_FRMSIZE_TYPE_DISCRETE
-
 ANSWER_S = 20.0  # for an answer, and for the user's to the system's question
 _MAX_ANSWERED_FORMATS = 64  # formats
 _INTERVAL_S = 0.02
@@ -101,7 +88,7 @@ def camera_with_formats(source: str) -> ListedCamera:
         )
     name, modes = camera_with_modes(number, sys.platform)
     return ListedCamera(
-        number, _shown(name), tuple(_shown(text) for text in described(modes)[:_MAX_FORMATS])
+        number, _shown(name), tuple(_shown(text) for text in described(modes)[:MAX_FORMATS])
     )
 
 
@@ -130,52 +117,15 @@ def _camera(number: int) -> ListedCamera | None:
     with suppress(OSError):  # it is in use, or this user may not open it
         node = os.open(DEVICES / f"video{number}", os.O_RDWR | os.O_NONBLOCK)
         try:
-            answer = bytearray(struct.calcsize(_CAPABILITY))
-            _ask(node, _QUERYCAP, answer)
-            if not struct.unpack(_CAPABILITY, answer)[5] & _CAPTURE:
+            if not delivers_images(node):
                 return None
-            formats = tuple(_formats(node))
+            formats = tuple(
+                _printable(code) + (f" {size[0]}×{size[1]}" if size else "")
+                for code, size in pixel_formats(node)
+            )
         finally:
             os.close(node)
     return ListedCamera(number, shown, formats)
-
-
-def _ask(node: int, request: int, answer: bytearray) -> None:
-    """Have a device fill in a structure.
-
-    :raises OSError: it does not.
-    """
-    import fcntl  # which other systems do not have
-
-    fcntl.ioctl(node, request, answer)
-
-
-def _formats(node: int) -> Iterator[str]:
-    """Yield each pixel format of a camera with its largest size."""
-    for index in range(_MAX_FORMATS):
-        answer = bytearray(struct.pack(_FORMAT, index, _CAPTURE, 0, b"", 0))
-        try:
-            _ask(node, _ENUM_FMT, answer)
-        except OSError:  # there are no more
-            return
-        code = struct.unpack(_FORMAT, answer)[4]
-        size = max(_sizes(node, code), default=None, key=lambda size: size[0] * size[1])
-        yield _printable(struct.pack("<I", code)) + (f" {size[0]}×{size[1]}" if size else "")
-
-
-def _sizes(node: int, code: int) -> Iterator[tuple[int, int]]:
-    """Yield the sizes of a pixel format; the largest one of a continuous range."""
-    for index in range(_MAX_SIZES):
-        answer = bytearray(struct.pack(_SIZE, index, code, 0, *[0] * 6))
-        try:
-            _ask(node, _ENUM_FRAMESIZES, answer)
-        except OSError:
-            return
-        values = struct.unpack(_SIZE, answer)
-        if values[2] != _DISCRETE:  # minimum, maximum and step of width and of height
-            yield values[4], values[7]
-            return
-        yield values[3], values[4]
 
 
 def _printable(name: bytes) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import errno
 import os
-import struct
 import sys
 from collections.abc import Iterator
 from fractions import Fraction
@@ -19,6 +18,7 @@ from ..errors import VideoError
 from ..notices import Notice
 from . import system_cameras
 from .source import DEFAULT_FPS, Clock, Picture, Source
+from .video4linux import delivers_images
 
 CAMERA_SIZE = (1280, 720)
 _OPEN_ERRORS = {
@@ -29,12 +29,6 @@ _OPEN_ERRORS = {
     errno.ENODEV: "is not plugged in any more",
     errno.ENXIO: "is not plugged in any more",
 }
-# Of linux/videodev2.h: the request for what a device can do, and where its answer says so.
-_QUERYCAP = 0x80685600
-_CAPABILITY = "16s32s32sIII12x"
-# the camera's nodes together can do what the first answer says
-_CAPTURE = 1
-_OF_THIS_NODE = 1 << 31
 
 
 class CameraSource(Source):
@@ -137,13 +131,8 @@ class CameraSource(Source):
 
 def device_problem(path: Path) -> str:
     """Return why a device of Linux cannot be used as a camera, as the end of a sentence; empty if
-    it can.
-
-    It is only asked what it is, which does not switch it on.
+    it can. This does not switch it on.
     """
-    import fcntl
-
-    answer = bytearray(struct.calcsize(_CAPABILITY))
     try:
         node = os.open(path, os.O_RDWR | os.O_NONBLOCK)
     except OSError as error:
@@ -151,13 +140,12 @@ def device_problem(path: Path) -> str:
             error.errno or 0, f"cannot be opened ({(error.strerror or 'unknown').lower()})"
         )
     try:
-        fcntl.ioctl(node, _QUERYCAP, answer)
+        gives = delivers_images(node)
     except OSError as error:
         gone = error.errno in (errno.ENODEV, errno.ENXIO, errno.EIO)
         return _OPEN_ERRORS[errno.ENODEV] if gone else "is not a camera; choose another device"
     finally:
         os.close(node)
-    of_all, of_this = struct.unpack(_CAPABILITY, answer)[4:6]
-    if not (of_this if of_all & _OF_THIS_NODE else of_all) & _CAPTURE:
-        return "delivers no images, like the second device of many cameras; choose another one"
-    return ""
+    if gives:
+        return ""
+    return "delivers no images, like the second device of many cameras; choose another one"

@@ -8,18 +8,23 @@ import sys
 import pytest
 from scope.scope_addon.job import live_cameras
 from scope.scope_addon.job.live_cameras import LONGEST_NAME, camera_source, list_cameras
+from scope.scope_addon.live import video4linux
 
 SIZES = {b"MJPG": [(640, 480), (1920, 1080)], b"YUYV": [(640, 480)]}
 
 
 def ioctl(node, request, answer):
-    """A camera with two formats, whose second node carries metadata; see linux/videodev2.h."""
+    """A camera with two formats, whose second node carries metadata; see linux/videodev2.h. An old
+    driver does not say what each node can do.
+    """
     number = request & 0xFF
     assert len(answer) == (request >> 16) & 0x3FFF  # the size that the request's number contains
     if number == 0:
         with open(f"/proc/self/fd/{node}", "rb") as file:
-            capabilities = 1 if file.read() == b"pictures" else 0x00800000
-        struct.pack_into("I", answer, 16 + 32 + 32 + 8, capabilities)
+            content = file.read()
+        of_this = {b"pictures": 1, b"metadata": 0x00800000, b"old": 0}[content]
+        of_all = 1 if content == b"old" else 1 << 31 | 0x00800000 | 1
+        struct.pack_into("II", answer, 16 + 32 + 32 + 4, of_all, of_this)
     elif number == 2:
         (index,) = struct.unpack_from("I", answer)
         if index >= len(SIZES):
@@ -40,7 +45,7 @@ def node(tmp_path, monkeypatch):
         pytest.skip("Video4Linux")
     monkeypatch.setattr(live_cameras, "NAMES", tmp_path / "sys")
     monkeypatch.setattr(live_cameras, "DEVICES", tmp_path / "dev")
-    monkeypatch.setattr(live_cameras, "_ask", ioctl)
+    monkeypatch.setattr(video4linux, "_ask", ioctl)
 
     def node(number, name, content):
         (tmp_path / "sys" / f"video{number}").mkdir(parents=True)
@@ -54,7 +59,7 @@ def node(tmp_path, monkeypatch):
 
 def test_cameras_are_listed_with_names_and_largest_sizes(node):
     assert list_cameras() == []
-    node(10, b"Second\n", b"pictures")
+    node(10, b"Second\n", b"old")
     node(0, b"USB Camera\n", b"pictures")
     node(1, b"USB Camera\n", b"metadata")
     labels = [camera.label for camera in list_cameras()]
