@@ -28,7 +28,7 @@ from collections.abc import Callable
 GRACE_S = 4.0
 _LIMIT_S = 5
 _INTERVAL_S = 0.5  # between two looks at the parent
-STOPPED = 130  # exit status of a process whose parent has ended
+STOPPED = 130  # exit status of a process that was stopped, as when its parent has ended
 
 
 def end_with_parent(

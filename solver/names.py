@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names and orders that are agreed on: SMPL's body joints, BlazePose's and COCO's keypoints."""
+"""Names and orders that are agreed on: SMPL's body joints, BlazePose's and COCO's keypoints, the
+fingers.
+"""
 
 # The joints that SMPL, SMPL+H and SMPL-X share, and each one's parent (-1: the root).
 BODY_JOINTS = (
@@ -10,6 +12,8 @@ BODY_JOINTS = (
     "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist",
 )  # fmt: skip
 BODY_PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19)
+
+FINGERS = ("thumb", "index", "middle", "ring", "pinky")  # models store them in other orders
 
 # The 33 keypoints of BlazePose, in its order.
 BLAZEPOSE = (

@@ -39,7 +39,7 @@ import numpy as np
 from .body import Body
 from .body_checks import check_body, check_tables
 from .errors import ModelFileError
-from .names import BLAZEPOSE, BODY_JOINTS, BODY_PARENTS, COCO
+from .names import BLAZEPOSE, BODY_JOINTS, BODY_PARENTS, COCO, FINGERS
 from .part import Array
 
 MAX_BETAS = 16  # as AMASS; SMPL-X and STAR files carry 300, most of them below a millimetre
@@ -126,7 +126,6 @@ LANDMARK_VERTICES: dict[int, dict[str, int]] = {
 }  # fmt: skip
 
 
-FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 LANDMARKS = (
     "nose",
     *(

@@ -12,15 +12,15 @@ from __future__ import annotations
 import numpy as np
 
 from ...solver.body import Body
+from ...solver.names import FINGERS
 from ...solver.rotations import exp, log
 from ..arrays import BoolArray, Float64Array
 from ..errors import UsageError
 from ..kinematics.axes import transposed
 from .clip import Clip, keys_within
 
-_FINGERS = ("index", "middle", "pinky", "ring", "thumb")
 LIMBS = {
-    "arms": ("collar", "shoulder", "elbow", "wrist", "hand", *_FINGERS),
+    "arms": ("collar", "shoulder", "elbow", "wrist", "hand", *FINGERS),
     "legs": ("hip", "knee", "ankle", "foot"),
 }
 # The arms point in opposite directions at rest. A half turn about z maps one arm's rotations to the
@@ -87,7 +87,7 @@ def swap_sides(clip: Clip, body: Body, start: float, end: float, limbs: str = "b
         for left, right in _pairs_of_joints(body, kind):
             for to, source in ((left, right), (right, left)):
                 rotation = clip.rotations[span, source]
-                if names[to].partition("_")[2].startswith(_FINGERS):
+                if names[to].partition("_")[2].startswith(FINGERS):
                     out.rotations[span, to] = SIDES_EXCHANGED @ rotation @ SIDES_EXCHANGED
                     continue
                 # Omega' = before^T Omega turn: the parent of the limb's first joint is the trunk,

@@ -15,11 +15,10 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import IO, Any, Protocol
 
-from ..parent import GRACE_S
+from ..parent import GRACE_S, STOPPED
 from .clip_task import FINISHED, ClipTask, Entry, capture_clip
 
 _WAIT_S = 1.0  # longest wait for a clip to finish
-STOPPED = 130  # exit status of a process that was stopped, or not started any more
 # Ctrl-C on a terminal must reach the batch only, which stops its clips: a second signal would
 # interrupt their clean-up.
 _NEW_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)

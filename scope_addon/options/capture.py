@@ -74,6 +74,7 @@ LENSES = (
 )
 
 
+MOST_VIEWS = 8  # videos of the same moment
 _MAX_PEOPLE = 100  # whose heights can be given
 
 

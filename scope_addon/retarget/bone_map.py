@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...solver.errors import InputError
+from ...solver.names import FINGERS
 from ..json_file import load_map, save_map
 
 SIDED_PARTS = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
 SPINE = ("spine1", "spine2", "spine3")
-FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 # Phalanges, from the knuckle on, with SMPL+H's names.
 PHALANGES = tuple(f"{finger}{k}" for finger in FINGERS for k in (1, 2, 3))
 PARTS = (

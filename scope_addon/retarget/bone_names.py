@@ -10,7 +10,8 @@ import unicodedata
 from collections import Counter
 from dataclasses import dataclass
 
-from .bone_map import FINGERS, SIDED_PARTS, SPINE
+from ...solver.names import FINGERS
+from .bone_map import SIDED_PARTS, SPINE
 
 _LATIN_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[぀-ヿ㐀-鿿々ー]+")
 _SIDES = {"l": "left", "left": "left", "lft": "left"}

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...solver.names import FINGERS
 from ..arrays import Float64Array, unit_vectors
-from .bone_map import FINGERS
 from .rest_pose import RestPose
 
 _WORDS = {

@@ -13,9 +13,10 @@ from itertools import product
 
 import numpy as np
 
+from ...solver.names import FINGERS
 from ..arrays import Float64Array
 from ..kinematics.mirrored_limbs import OTHER_SIDE, other_side
-from .bone_map import FINGERS, PHALANGES, SPINE, BoneMap
+from .bone_map import PHALANGES, SPINE, BoneMap
 from .bone_names import CENTRE, LIMBS, BoneName, bone_names, parse_names
 from .fingers import find_fingers
 from .rest_pose import RestPose, faces_backwards, rest_faults

@@ -22,8 +22,8 @@ from ..arrays import Float64Array, IndexArray
 from ..kinematics.axes import rotated, transposed
 from .bone_map import BoneMap
 
-# Below this share of the rig's size, two heads are at the same place.
-_SAME_PLACE = 0.002
+# Below this share of the rig's size, two ends of bones are at the same place.
+SAME_PLACE = 0.002
 # A tail further off the line from the parent's head than this, or longer than these multiples of
 # its length, means nothing.
 _MAX_TAIL_TURN = np.radians(60)
@@ -133,7 +133,7 @@ class RestPose:
         known = [self.heads[k] for k in knuckles] or [
             self.heads[child]
             for child in self.children[bone]
-            if np.linalg.norm(self.heads[child] - head) > _SAME_PLACE * self.size
+            if np.linalg.norm(self.heads[child] - head) > SAME_PLACE * self.size
         ]
         if known:
             return np.asarray(np.mean(known, axis=0))
@@ -142,7 +142,7 @@ class RestPose:
             return _ball(owned, head, forward)
         if len(owned):
             away = 2.0 * (owned.mean(axis=0) - head)
-            if np.linalg.norm(away) > _SAME_PLACE * self.size:
+            if np.linalg.norm(away) > SAME_PLACE * self.size:
                 return np.asarray(head + away)
         return self._end_without_skin(bone, forward)
 
@@ -154,7 +154,7 @@ class RestPose:
             (
                 head - self.heads[ancestor]
                 for ancestor in reversed(self.chains[bone][:-1])
-                if np.linalg.norm(head - self.heads[ancestor]) > _SAME_PLACE * self.size
+                if np.linalg.norm(head - self.heads[ancestor]) > SAME_PLACE * self.size
             ),
             None,
         )

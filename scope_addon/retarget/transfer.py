@@ -18,12 +18,13 @@ from __future__ import annotations
 import numpy as np
 
 from ...solver.body import Body
+from ...solver.names import FINGERS
 from ...solver.rotations import exp, shortest_turn
 from ..arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ..edit.clip import Clip
 from ..kinematics.axes import R_WORLD_MODEL, UP
 from ..kinematics.smoothing import interpolate_rotations
-from .bone_map import FINGERS, SPINE, BoneMap
+from .bone_map import SPINE, BoneMap
 from .foot_placement import legs_at_rest, place_feet
 from .rest_pose import Pose, Skeleton, head_positions
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..motion import Motion
 
 BASE_BYTES = 2 << 30
-LAST_FRAME = 1_048_574  # of a scene, which Blender does not let it exceed
+LAST_FRAME = 1_048_574  # of Blender's timeline; the first one is its negative
 _BYTES_PER_BONE = 2900  # of a frame, by the exporter of .glb; the others need less
 _BYTES_PER_ROW = 10_000  # of markers or angles, and of a frame from which they follow
 _BYTES_PER_BYTE = 1000  # of compressed content; captures need 300, from 100 to 400

@@ -25,7 +25,7 @@ from ..kinematics.axes import transform_points, transposed, unscaled
 from ..notices import MAX_NAMES, Notice, and_more, notice
 from ..retarget.bone_map import PHALANGES, check_bone_count
 from ..retarget.fingers import bone_ends
-from ..retarget.rest_pose import BoneMotion, RestPose, Skeleton
+from ..retarget.rest_pose import SAME_PLACE, BoneMotion, RestPose, Skeleton
 from .actions import assign_action, bone_path, nla_fcurves, read_keys, used_slot
 from .character.root_object import root_object, topmost
 from .datablocks import changed, is_deformed_by, modifiers_off
@@ -39,7 +39,6 @@ _CARRIER_TOLERANCE = 0.02
 # change of a rotation matrix's entries; the probe changes them by more than 0.3
 _MIN_RESPONSE = 0.1
 _MAX_CHECKED_FRAMES = 10
-_SAME_PLACE = 0.002  # of the ends of two bones, as a share of the rig's size
 _MAX_DEVIATION = np.radians(20)
 _MAX_SHIFT = 0.05  # of the root bone's head from where it should be, as a share of the rig's size
 _VISIBLE = 1e-3  # of a bone's pose: radians, factors and shares of its length
@@ -368,7 +367,7 @@ def _twins(rig: Object, names: Sequence[str]) -> dict[str, int]:
     for bone in bones:
         if bone.use_deform and bone.name in skinned and bone.name not in names:
             off = np.abs(places - [*bone.head_local, *bone.tail_local]).max(axis=1)
-            if off.min() < _SAME_PLACE * np.ptp(places):
+            if off.min() < SAME_PLACE * np.ptp(places):
                 twins[bone.name] = int(off.argmin())
     return twins
 

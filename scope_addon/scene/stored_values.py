@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from bpy.types import ID, Action, Object
 
+from .budget import LAST_FRAME
+
 if TYPE_CHECKING:
     from ..arrays import Float64Array
     from ..review_spans import Span
 
-LAST_FRAME = 1_048_574  # of Blender's timeline; the first one is its negative
 # the least and the largest frame rate that Blender can store, frames per second
 RATES = 0.01, 32767.0
 # custom property of an armature: the scene's frame rate for which its keys were written

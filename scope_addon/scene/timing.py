@@ -22,8 +22,9 @@ from bpy.types import ID, Action, FCurve, NlaStrip, Object, Scene
 from ..arrays import Float64Array, FloatArray, IndexArray
 from ..errors import MotionFileError, UsageError
 from ..notices import Notice, notice
+from .budget import LAST_FRAME
 from .datablocks import action_of
-from .stored_values import LAST_FRAME, RATE, RATES, stored_rate, stored_text
+from .stored_values import RATE, RATES, stored_rate, stored_text
 
 # Rates within this tolerance (frames per second) of a standard one are taken to be it: 23.98 is 24
 # / 1.001.

@@ -16,6 +16,7 @@ from bpy.types import Context, Event, Operator, Panel, Scene
 
 from ...solver.errors import ScopeError
 from ..errors import UsageError
+from ..options.capture import MOST_VIEWS
 from ..scene.datablocks import found
 from ..scene.visibility import window_shows
 from . import warm_up
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from .capture_job import CaptureJob
 
 SAMPLE = Path(__file__).resolve().parents[2] / "assets" / "sample" / "sample.mp4"
-MOST_FURTHER_VIEWS = 7
 DRAWN_EVERY_S = 0.3  # between two drawings of a stage's progress; previews come as often
 ASK_AFTER_S = 10.0  # a capture that has run longer is cancelled only after a question
 # States of a clip of the queue.
@@ -128,7 +128,7 @@ class SCOPE_OT_add_view(SeveralFootageBrowser, Operator):
         settings = context.scene.scope
         if not settings.footage:
             return refuse(cls, "Choose a video or image first")
-        if len(settings.views) >= MOST_FURTHER_VIEWS:
+        if len(settings.views) >= MOST_VIEWS - 1:
             return refuse(cls, "There are at most eight cameras")
         return True
 
@@ -138,7 +138,7 @@ class SCOPE_OT_add_view(SeveralFootageBrowser, Operator):
         paths = chosen_files(self)
         if not paths:
             return {"CANCELLED"}
-        if len(settings.views) + len(paths) > MOST_FURTHER_VIEWS:
+        if len(settings.views) + len(paths) > MOST_VIEWS - 1:
             self.report({"ERROR"}, rpt_("There are at most eight cameras"))
             return {"CANCELLED"}
         for path in paths:

@@ -18,9 +18,10 @@ from bpy.props import (
 from bpy.types import Context, Object, Scene
 
 from ..errors import UsageError
+from ..scene.budget import LAST_FRAME
 from ..scene.character.correction_list import listed_corrections, store_corrections
 from ..scene.datablocks import cameras_of_clip, captures_of, holds, is_person
-from ..scene.stored_values import LAST_FRAME, start_frame
+from ..scene.stored_values import start_frame
 from .captured_person import (
     EditOperator,
     SpanOperator,

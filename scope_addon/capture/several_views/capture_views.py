@@ -19,7 +19,7 @@ from ...clock import FINDING, PLACING, Progress, StageClock
 from ...errors import UsageError
 from ...footage import display_text
 from ...notices import Notice, notice
-from ...options.capture import ALL
+from ...options.capture import ALL, MOST_VIEWS
 from ..camera.calibration import Calibration, placed_cameras, read_calibration
 from ..camera.intrinsics import Camera
 from ..fitting.keypoint_offsets import with_keypoint_offsets
@@ -50,7 +50,6 @@ from .person_in_views import PersonInViews, with_focal_scale
 from .seen_person import KEYPOINTS, SeenPerson, bone_lengths, seen_person
 from .synchronize import APART_S, offset_by_sound
 
-MOST_VIEWS = 8
 # Of the speeds of slow motion: files state the rate at which they play with errors of a thousandth.
 MOST_SPEED_DIFFERENCE = 0.02
 # Of the standard deviation of a camera's rotation, from which on the report warns.

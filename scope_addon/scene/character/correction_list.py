@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bpy.types import Object
 
-from ..stored_values import LAST_FRAME
+from ..budget import LAST_FRAME
 
 if TYPE_CHECKING:
     from ...arrays import Float64Array

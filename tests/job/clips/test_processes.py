@@ -8,7 +8,8 @@ import threading
 
 import pytest
 from scope.scope_addon.job import clip_runner as module
-from scope.scope_addon.job.clip_runner import STOPPED, ClipProcesses
+from scope.scope_addon.job.clip_runner import ClipProcesses
+from scope.scope_addon.parent import STOPPED
 
 from ..processes import wait_for
 
