@@ -162,6 +162,9 @@ def find_floor(places: Float64Array, path: Float64Array, up: FloatArray) -> Plan
         return None
     for _ in range(3):
         on_it, _ = _on_floor(places, path, best)
+        # Corners along a line, as of a caption, lie in planes of any tilt.
+        if on_it.sum() < MIN_FLOOR or best.normal @ up <= MAX_TILT_COS:
+            return None
         best = _fitted_plane(places[on_it], up)
     return best
 
@@ -202,6 +205,8 @@ def with_feet(floor: Plane, places: Float64Array, soles: FloatArray, path: Float
         near = np.abs(lowest @ floor.normal - floor.offset) < 4.0 * FLAT * height
         on_it, _ = _on_floor(places, path, floor)
         corners = places[on_it]
+        if len(corners) < MIN_FLOOR:
+            break
         feet = lowest[near][:: max(1, len(lowest) // max(1, len(corners)))]
         floor = _fitted_plane(np.concatenate([corners, feet]), floor.normal)
     return floor

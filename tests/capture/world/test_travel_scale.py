@@ -13,6 +13,7 @@ from scope.scope_addon.capture.world.travel_scale import (
     _fitted_plane,
     belt_travel,
     contradicting_strides,
+    find_floor,
     scaled_travel,
     walking_speed,
 )
@@ -165,6 +166,19 @@ def test_the_floor_of_a_long_path_takes_little_memory():
     floor = _fitted_plane(flat + [0.0, -1.0, 0.0], np.array([0.0, 1.0, 0.0]))
     np.testing.assert_allclose(floor.normal, [0.0, 1.0, 0.0], atol=1e-3)
     assert floor.offset == pytest.approx(-1.0, abs=1e-3)
+
+
+def test_corners_along_a_line_are_no_floor():
+    """As those of a caption at the bottom of the picture: planes of any tilt go through a line."""
+    path = CENTER / SCALE
+    found = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        line = np.stack([rng.uniform(-2, 2, 40), np.full(40, 0.6), np.full(40, 1.5)], axis=1)
+        found.append(find_floor(line + 0.002 * rng.standard_normal(line.shape), path, UP))
+    for floor in found:
+        assert floor is None or floor.normal @ UP > np.cos(np.radians(16.0))
+    assert sum(floor is None for floor in found) > 10
 
 
 def test_strides_on_the_spot_contradict_a_path_that_stands_still():
