@@ -176,6 +176,17 @@ def log(rotation: ArrayLike) -> Array:
     return phi
 
 
+def quaternion_from_rotation_vector(phi: ArrayLike) -> Array:
+    """Return unit quaternions (..., 4), w first, of rotation vectors (..., 3), radians.
+
+    :raises ShapeError: the vectors have another shape.
+    """
+    v = as_arrays(phi, (3,), "A rotation vector")
+    half = 0.5 * np.linalg.norm(v, axis=-1, keepdims=True)
+    # numpy's sinc(x) is sin(πx)/(πx): smooth at zero, where sin(half)/angle would divide by zero
+    return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * v], axis=-1)
+
+
 def quaternion_from_matrix(rotation: ArrayLike) -> Array:
     """Return unit quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3).
 

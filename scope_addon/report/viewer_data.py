@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
+from ...solver.rotations import quaternion_from_rotation_vector
 from ..arrays import Float64Array, Uint8Array
 from ..motion import Motion
 
@@ -118,9 +119,6 @@ def quantized_rotations(poses: Float64Array) -> NDArray[np.int16]:
     """Return axis-angle vectors (T, K+1, 3) as unit quaternions (T, K+1, 4), w first and not
     negative, times 32767.
     """
-    angle = np.linalg.norm(poses, axis=-1, keepdims=True)
-    # sin(θ/2) / θ, which is 1/2 at 0; np.sinc(x) = sin(πx) / (πx).
-    vector = 0.5 * np.sinc(angle / (2 * np.pi)) * poses
-    quaternions = np.concatenate([np.cos(angle / 2), vector], axis=-1)
+    quaternions = quaternion_from_rotation_vector(poses)
     quaternions *= np.where(quaternions[..., :1] < 0, -1, 1)
     return np.round(_QUATERNION * quaternions).astype(np.int16)

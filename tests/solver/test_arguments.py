@@ -262,6 +262,10 @@ CALLS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     "rotations.hat": (rotations.hat, VECTORS),
     "rotations.exp": (rotations.exp, VECTORS),
     "rotations.log": (rotations.log, MATRICES),
+    "rotations.quaternion_from_rotation_vector": (
+        rotations.quaternion_from_rotation_vector,
+        VECTORS,
+    ),
     "rotations.quaternion_from_matrix": (rotations.quaternion_from_matrix, MATRICES),
     "rotations.matrix_from_quaternion": (
         rotations.matrix_from_quaternion,

@@ -74,6 +74,8 @@ def test_quaternions_go_both_ways():
     np.testing.assert_allclose(q[:, 0], np.cos(half), atol=1e-9)
     np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1, atol=1e-14)
     np.testing.assert_allclose(rotations.matrix_from_quaternion(3.0 * q), R, atol=1e-14)
+    of_vectors = rotations.quaternion_from_rotation_vector(VECTORS)
+    np.testing.assert_allclose(rotations.matrix_from_quaternion(of_vectors), R, atol=1e-14)
 
 
 def test_nearest_rotation_repairs_and_survives_anything():

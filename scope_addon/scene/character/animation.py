@@ -17,22 +17,13 @@ import numpy as np
 from bpy.types import Action, Object
 
 from ....solver.body import Body
-from ....solver.rotations import quaternion_from_matrix
+from ....solver.rotations import quaternion_from_matrix, quaternion_from_rotation_vector
 from ...arrays import Float64Array
 from ...kinematics.axes import R_WORLD_MODEL, transposed
 from ...kinematics.smoothing import on_one_hemisphere
 from ...motion import Motion
 from ..actions import Channels, bone_path
 from .armature import RestPose, rest_orientations
-
-
-def quaternion_from_rotation_vector(rotation_vectors: Float64Array) -> Float64Array:
-    """Convert rotation vectors (..., 3), radians, to unit quaternions (..., 4) in the order w, x,
-    y, z.
-    """
-    half = 0.5 * np.linalg.norm(rotation_vectors, axis=-1, keepdims=True)
-    # numpy's sinc(x) is sin(πx)/(πx): smooth at zero, where sin(half)/angle would divide by zero.
-    return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * rotation_vectors], axis=-1)
 
 
 def quaternion_product(a: Float64Array, b: Float64Array) -> Float64Array:
