@@ -29,8 +29,9 @@ from .request import WARM_UP, Commands, FormatsRequest, JobRequest, LiveRequest,
 from .watched_footage import WatchedFiles
 
 _REMOVAL_ATTEMPTS = 20  # an attempt fails if a file is created during it
-# of a capture: with 5, drawing without a graphics card waits for it; compiling ahead of it has 19
+# How far a capture gives way to others. With 5, drawing without a graphics card waits for it.
 _NICENESS = 12
+_NICENESS_OF_WARM_UP = 19  # the most there is
 _MIN_INTERVAL_S = 0.05  # between two progress messages of one stage
 
 
@@ -167,7 +168,7 @@ def main(job_folder: Path) -> NoReturn:
             request = _parsed(line)
             _confine(request, job_folder)  # before there are other threads
             end_with_parent(lambda: _remove(job_folder), commands.receive)
-            _lower_priority(_NICENESS if request else 19)
+            _lower_priority(_NICENESS if request else _NICENESS_OF_WARM_UP)
             status = run(request, job_folder, reporter, commands)
         except ScopeError as error:
             reporter.send("error", message=str(error))

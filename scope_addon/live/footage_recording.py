@@ -122,7 +122,7 @@ class FootageRecording:
             self._problem = f"cannot write {self._path}: {reason(error)}"
 
     def _write(self) -> None:
-        # as the encoder needs it
+        # the encoder needs even sides
         height = self._size[0] // 2 * 2
         width = self._size[1] // 2 * 2
         assert self.origin is not None

@@ -26,7 +26,7 @@ _QUEUED_LINES = 2  # per client and person; older ones are dropped
 # some eight poses: what the system queues for a slow client is delay as well
 _SEND_BUFFER_BYTES = 32768
 _SEND_TIMEOUT_S = 10.0  # after which a client that reads nothing is disconnected
-# for which the end waits for all clients together; with the time for a source, less than a second
+# The end waits so long for all clients together: with the time for a source, less than a second.
 _CLOSING_S = 0.4
 
 
