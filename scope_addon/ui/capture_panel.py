@@ -235,12 +235,17 @@ class SCOPE_PT_result(Tab, Panel):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Require a capture in this scene: copied settings may refer to another scene's."""
-        return shown_capture(context.scene) is not None
+        """Require a capture in this scene, or a person without one at another frame rate: copied
+        settings may refer to another scene's.
+        """
+        return shown_capture(context.scene) is not None or keyed_for(context.scene) > 0
 
     def draw(self, context: Context) -> None:
         """Draw the panel."""
         layout = self.layout
+        if shown_capture(context.scene) is None:  # a person was appended without the collection
+            _draw_frame_rate(context, layout)
+            return
         draw_captures(layout, context)
         if text := unit_text(context.scene):
             draw_text(context, layout.box(), text, "ERROR")
@@ -330,6 +335,11 @@ class SCOPE_PT_figures(Tab, Panel):
     bl_parent_id = "SCOPE_PT_result"
     bl_label = "Details"
     bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        """Require a capture."""
+        return shown_capture(context.scene) is not None
 
     def draw(self, context: Context) -> None:
         """Draw the panel."""

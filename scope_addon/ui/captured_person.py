@@ -79,7 +79,12 @@ def retargeted_from(scene: Scene, rig: Object) -> Object | None:
 
 def captured_people(context: Context) -> list[Object]:
     """Return the captured armatures of the scene."""
-    return [obj for obj in context.scene.objects if obj.type == "ARMATURE" and is_person(obj)]
+    return people_in(context.scene)
+
+
+def people_in(scene: Scene) -> list[Object]:
+    """Return the captured armatures of a scene."""
+    return [obj for obj in scene.objects if obj.type == "ARMATURE" and is_person(obj)]
 
 
 def has_captured_person(context: Context) -> bool:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import ID, Context, Object, Scene
 
+from ..errors import UsageError
 from ..notices import Notice, notice
 from ..scene.datablocks import holds
 from ..scene.stored_values import parse_spans, spans_text, start_frame, stored_rate
@@ -14,6 +15,7 @@ from .captured_person import (
     captured_people,
     library_of,
     motion_if_stored,
+    people_in,
     retargeted_from,
 )
 from .captures import people_of, shown_capture
@@ -56,16 +58,42 @@ def differs(scene: Scene) -> bool:
 
 
 def keyed_for(scene: Scene) -> float:
-    """Return the frame rate that the shown capture was keyed for, if the scene has another one
-    since; otherwise 0.
+    """Return the frame rate that captured motion was keyed for, if the scene has another one;
+    otherwise 0.
 
     Blender's importer of FBX files, for example, sets the scene's frame rate, which changes the
-    speed of all keys.
+    speed of all keys; and a person may be appended from a file of another rate.
     """
     now = scene.render.fps / scene.render.fps_base
     capture = shown_capture(scene)
-    rates = [stored_rate(person, now) for person in people_of(capture)] if capture else []
+    people = people_of(capture) if capture else people_in(scene)
+    rates = [stored_rate(person, now) for person in people]
     return next((rate for rate in rates if abs(rate - now) > _SAME), 0.0)
+
+
+def _has_motion_rate(scene: Scene) -> bool:
+    """Return whether `_motion_rate` may find one, without reading a motion"""
+    result = scene.scope.result
+    return result.footage_rate > 0 or (result.people == 0 and bool(people_in(scene)))
+
+
+def _motion_rate(scene: Scene) -> float:
+    """Return the frame rate of the shown capture's motion, 0 of a still image
+
+    A capture that the command line has written into a .blend file, or a person who was appended
+    without the collection, has no result that says so; the stored motion does, or else the keys.
+    """
+    result = scene.scope.result
+    if result.footage_rate > 0 or result.people:
+        return float(result.footage_rate)
+    capture = shown_capture(scene)
+    for person in (capture and people_of(capture)) or people_in(scene):
+        motion = motion_if_stored(person)
+        if motion is None:
+            return stored_rate(person, 0.0)
+        if len(motion) > 1:
+            return float(motion.mocap_framerate)
+    return 0.0
 
 
 class SCOPE_OT_match_frame_rate(ReportingOperator):
@@ -84,7 +112,7 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         file.
         """
         scene = context.scene
-        if scene.scope.result.footage_rate <= 0:
+        if not _has_motion_rate(scene):
             return refuse(cls, "The scene contains no captured video or imported motion")
         for block in (scene, *captured_people(context)):
             if (library := _library(block)) is not None:
@@ -107,7 +135,12 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         scene = context.scene
         people = captured_people(context)
         former = scene_rate(scene)
-        rate = _exact(scene.scope.result.footage_rate)
+        rate = _motion_rate(scene)
+        if not rate > 0:
+            raise UsageError(
+                "the captured picture has no frame rate; set the one that you want in Output > Format"
+            )
+        rate = _exact(rate)
         bodies = {person: body_of(person) for person in people if person.get("scope_resampled")}
         for person, body in bodies.items():  # which fails without keys, before anything is changed
             read_clip(person, body, former)

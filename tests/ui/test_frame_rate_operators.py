@@ -3,6 +3,8 @@
 keys stay.
 """
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -12,8 +14,9 @@ from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.retarget.expression_map import ExpressionMap
 from scope.scope_addon.scene.actions import fcurves, fcurves_of, has_slots, push_to_nla, read_keys
-from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
+from scope.scope_addon.scene.export.export import export_motions
 from scope.scope_addon.scene.face_retarget import CapturedExpressions, retarget_expressions
 from scope.scope_addon.scene.packed_motion import pack_motion, stored_motion
 from scope.scope_addon.ui.capture_job import show_result
@@ -420,6 +423,47 @@ def test_a_picture_has_no_frame_rate(scene, standing):
     show_result(result.collection.scope_result, "", Report(), result)
     with pytest.raises(RuntimeError, match="no captured video"):
         bpy.ops.scope.match_frame_rate()
+
+
+@pytest.fixture
+def shell_file(tmp_path):
+    """A capture of 30 frames per second in a .blend file, as the command line writes it."""
+    path = tmp_path / "walk.blend"
+    motion = motion_of(walk(2.0))
+    export_motions([motion], BODY, path, build_options=replace(NEW_SCENE, name="walk"))
+    return path
+
+
+def test_a_capture_that_the_shell_wrote_keeps_its_speed(shell_file):
+    bpy.ops.wm.open_mainfile(filepath=str(shell_file))
+    scene = bpy.context.scene
+    person = bpy.data.objects["walk"]
+    action = person.animation_data.action
+    assert not action.use_frame_range  # which would cut what the NLA plays of it
+    before = at_times(person, NAMES, 0.0)
+    scene.render.fps = 15
+    assert keyed_for(scene) == 30
+    bpy.ops.scope.match_frame_rate()
+    assert scene.render.fps == 30
+    np.testing.assert_allclose(at_times(person, NAMES, 0.0), before, atol=1e-4)
+    built(mocap_framerate=np.array(60.0), timestamps=np.arange(61) / 60.0)
+    bpy.ops.scope.match_frame_rate()
+    assert scene.render.fps == 60
+    np.testing.assert_allclose(at_times(person, NAMES, 0.0), before, atol=1e-4)
+    assert tuple(action.frame_range) == (0, 120)
+
+
+def test_a_person_who_was_appended_without_the_collection_gets_the_speed_back(scene, shell_file):
+    with bpy.data.libraries.load(str(shell_file)) as (_, chosen):
+        chosen.objects = ["walk"]
+    (person,) = chosen.objects
+    scene.collection.objects.link(person)
+    assert keyed_for(scene) == 30
+    assert bpy.types.SCOPE_PT_result.poll(bpy.context)  # and says so
+    bpy.ops.scope.match_frame_rate()
+    assert scene.render.fps == 30
+    assert tuple(person.animation_data.action.frame_range) == (0, 60)
+    assert keyed_for(scene) == 0
 
 
 @pytest.mark.parametrize(

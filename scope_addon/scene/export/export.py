@@ -161,7 +161,8 @@ def _write_one(
         modifiers_applied(scene, path.name)
         if suffix in (".glb", ".fbx", ".usdc")
         else nullcontext(()) as notices,
-        actions_over_scene_range(scene),
+        # A .blend file is worked on further, and its actions are as long as their keys.
+        nullcontext() if suffix == ".blend" else actions_over_scene_range(scene),
     ):
         rig = next((obj for obj in scene.objects if obj.type == "ARMATURE"), None)
         if rig is None:  # none of them can be in this scene
