@@ -76,12 +76,12 @@ def guess(rest: RestPose, *, is_mirrored: bool = False, held: Collection[str] = 
         return whole if _is_impossible(rest, free.parts) else _with_limbs(free, whole)
     shaped = by_geometry(rest)
     named = rigify or by_name(rest)
+    if is_mirrored and any(name.side for name in parse_names(rest.names)):
+        named = {bone: other_side(part) for bone, part in named.items()}
     if _is_impossible(rest, named) and not _is_impossible(rest, shaped):
         named = {}
     parts = named | _lacking(named, shaped)
     backwards = faces_backwards(_heads_of(rest, parts))
-    if backwards is None:
-        backwards = is_mirrored and any(name.side for name in parse_names(rest.names))
     if backwards:
         parts = {bone: other_side(part) for bone, part in parts.items()}
     if rigify is None:

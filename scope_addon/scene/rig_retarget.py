@@ -65,7 +65,11 @@ from .transaction import all_or_nothing
 from .visibility import evaluated, world_matrix
 
 # Whose motion is missed where a rig has no bones for them.
-_EXPECTED = ("head", "left_shoulder", "left_elbow", "right_shoulder", "right_elbow")
+_EXPECTED = (
+    "head",
+    *(f"{side}_{part}" for side in ("left", "right") for part in ("shoulder", "elbow", "wrist")),
+    *("left_ankle", "right_ankle"),
+)
 # Largest difference from the identity of the rotations of fingers that were not captured, which
 # single precision leaves.
 _AT_REST = 1e-5

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scope.scope_addon.kinematics.mirrored_limbs import other_side
 from scope.scope_addon.retarget.guess import by_geometry, by_name, guess
 from scope.scope_addon.retarget.rest_pose import RestPose
 from scope.solver.rotations import exp
@@ -208,6 +209,22 @@ def test_names_tell_the_sides_of_a_rig_without_toes(angle: float) -> None:
     assert found.parts == {
         name: part_of[bones.names[row]] for name, row in zip(names, kept, strict=True)
     }
+
+
+def test_a_mirrored_rig_has_feet_and_hands_whose_names_tell_only_the_side() -> None:
+    """What the other names call left is on the right there."""
+    bones, part_of = bones_of("unreal")
+    telling = {}
+    for row, (bone, part) in enumerate(part_of.items()):
+        side, _, kind = part.partition("_")
+        unknown = kind in ("ankle", "foot", "wrist", "collar")
+        telling[bone] = f"q{row}_{side[0]}" if unknown else bone
+    names = [telling[bone] for bone in bones.names]
+    mirrored = RestPose(names, bones.parents, bones.heads * [-1.0, 1.0, 1.0])
+    found = guess(mirrored, is_mirrored=True).parts
+    plain = guess(RestPose(names, bones.parents, bones.heads)).parts
+    assert {"left_ankle", "right_wrist", "left_collar"} <= set(plain.values())
+    assert found == {bone: other_side(part) for bone, part in plain.items()}
 
 
 def doubled(bones: RestPose, first: str, second: str) -> RestPose:

@@ -118,6 +118,16 @@ def test_a_subdivided_mesh_is_not_evaluated_for_bones(source, tmp_path):
     assert direction_error(rig, bone_of, ARMS + LEGS, JOINTS) < 1.0
 
 
+def test_hands_and_feet_without_bones_are_named(source):
+    rig, bone_of = build_rig("unreal")
+    parts = guess_bone_map(rig).parts
+    for part in ("left_foot", "left_ankle", "right_wrist"):
+        del parts[bone_of[part]]
+    (warning,) = run(source, rig, BoneMap(parts)).warnings
+    assert warning.code == "still_parts"
+    assert warning.values["parts"] == ["right_wrist", "left_ankle"]
+
+
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_stretched_rig_keeps_its_bones_together_and_is_reported(source, axis):
     """A stretched object shears bones that turn. Where the probe looked at them in the world, a
