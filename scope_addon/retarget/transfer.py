@@ -252,12 +252,14 @@ def _palm_alignment(
     index: dict[str, int],
     side: str,
 ) -> Float64Array | None:
-    """Return the rotation (3, 3) of the rig's palm to the body's, from wrist and knuckles; None
-    without fingers.
+    """Return the rotation (3, 3) of the rig's palm to the body's, from wrist and the outermost
+    knuckles that both have; None without two fingers beside the thumb.
     """
-    parts = [f"{side}_{part}" for part in ("wrist", "index1", "pinky1")]
-    if not all(part in row and part in index for part in parts):
+    parts = [f"{side}_{part}" for part in ("wrist", *(f"{finger}1" for finger in FINGERS[1:]))]
+    parts = [part for part in parts if part in row and part in index]
+    if len(parts) < 3 or not parts[0].endswith("wrist"):
         return None
+    parts = [parts[0], parts[1], parts[-1]]
     palms = []
     for points, rows in ((heads, row), (rest, index)):
         wrist, first, last = (points[rows[part]] for part in parts)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix, Vector
 from scope.scope_addon.edit.clip import Clip
+from scope.scope_addon.retarget.bone_map import BoneMap
 from scope.scope_addon.scene.actions import bone_path, fcurves
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.rig_retarget import guess_bone_map
@@ -158,6 +159,19 @@ def test_fingers_point_where_the_body_points(source, scheme, twist):
     rig, bone_of = build_hands(scheme, twist, matrix=FBX if scheme == "mixamo" else None)
     run(source, rig, body=HANDS)
     check_hands(rig, bone_of)
+
+
+def test_the_palms_of_hands_with_fewer_fingers_are_aligned(source):
+    """They are turned at rest, and the outermost knuckles that there are show how far."""
+    rig, bone_of = build_hands("unreal", 1.2)
+    parts = guess_bone_map(rig).parts
+    run(source, rig, BoneMap({b: p for b, p in parts.items() if "pinky" not in p}), body=HANDS)
+    joints = truth(motion_of(gesture(), body=HANDS), HANDS)[[f - 1 for f in FRAMES]]
+    for side in ("left", "right"):
+        names = [f"{side}_{part}" for part in ("wrist", "index1", "ring1")]
+        w, i, r = np.moveaxis(seen(rig, [bone_of[name] for name in names]), 1, 0)
+        W, I, R = np.moveaxis(joints[:, [HANDS.joint_names.index(name) for name in names]], 1, 0)
+        assert angles(np.cross(i - w, r - w), np.cross(I - W, R - W)).max() < 1.0, side
 
 
 @pytest.mark.slow
