@@ -138,7 +138,8 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         rate = _motion_rate(scene)
         if not rate > 0:
             raise UsageError(
-                "the captured picture has no frame rate; set the one that you want in Output > Format"
+                "the captured picture has no frame rate; set the one that you want in Output > "
+                "Format"
             )
         rate = _exact(rate)
         bodies = {person: body_of(person) for person in people if person.get("scope_resampled")}
