@@ -39,8 +39,10 @@ from .line_segments import find_segments
 WORKING_SIDE_PX = 480  # the longer side of the image in which corners are followed
 HYPOTHESES = 128  # of two directions each
 MAX_CORNERS = 240
-MIN_CORNERS = 24
-KEY_SHARE = 0.5  # of a key frame's corners; with fewer left, the next key frame begins
+MIN_CORNERS = 24  # with fewer left, the next key frame begins
+MIN_INLIERS = 12  # corners that a rotation must explain
+QUALITIES = (0.01, 0.001)  # of a corner, relative to the best one; the second where few are found
+KEY_SHARE = 0.5  # of a key frame's corners, likewise
 INLIER_PX = 1.2  # in the working image
 MAX_RETURN_PX = 0.7  # between a corner and where it is found when it is followed back, likewise
 MIN_INLIER_SHARE = 0.35  # of corners; a crowd or water that fills the picture gives no rotation
@@ -190,18 +192,18 @@ class BackgroundTracker:
         """Return the rotation (3, 3) from the key frame's axes to the current camera's, or None if
         it is unknown.
         """
-        if len(self._points) < MIN_CORNERS:
+        if len(self._points) < MIN_INLIERS:
             return None
         assert self._image is not None
         moved, good = follow_corners(self._image, image, self._points, boxes, MAX_RETURN_PX)
         self._points = moved[good]
         self._key_rays = self._key_rays[good]
-        if len(self._points) < MIN_CORNERS:
+        if len(self._points) < MIN_INLIERS:
             return None
         rays = self._rays(self._points)
         R, agree = consensus_rotation(self._key_rays, rays, self._tolerance, self._random)
         self._inlier_shares.append(float(agree.mean()))
-        if agree.mean() < MIN_INLIER_SHARE or agree.sum() < MIN_CORNERS // 2:
+        if agree.mean() < MIN_INLIER_SHARE or agree.sum() < MIN_INLIERS:
             return None
         return R
 
@@ -221,8 +223,11 @@ class BackgroundTracker:
     def _begin_key(self, image: Uint8Array, boxes: Sequence[Float64Array]) -> None:
         """Begin the next key frame, at the last known rotation."""
         mask = background_mask(image, boxes)
-        corners = cv2.goodFeaturesToTrack(image, MAX_CORNERS, 0.01, 7, mask=mask)
-        self._points = np.asarray([] if corners is None else corners, np.float32).reshape(-1, 2)
+        for quality in QUALITIES:
+            corners = cv2.goodFeaturesToTrack(image, MAX_CORNERS, quality, 7, mask=mask)
+            self._points = np.asarray([] if corners is None else corners, np.float32).reshape(-1, 2)
+            if len(self._points) >= 2 * MIN_CORNERS:
+                break
         self._key_rays = self._rays(self._points)
         self._key_count = len(self._points)
         self._image = image

@@ -100,6 +100,29 @@ def test_a_large_moving_object_does_not_disturb_the_estimate(panorama):
     assert angle_deg(found.R_first_camera, truth).max() < 0.4
 
 
+def plain_wall(bright, faint):
+    """A wide picture of a plain wall with dots, that many bright and that many faint ones."""
+    rng = np.random.default_rng(5)
+    image = np.full((WIDE // 2, WIDE), 100.0, np.float32)
+    grid = np.stack(np.meshgrid(np.arange(60, WIDE, 45), np.arange(480, 880, 45)), -1)
+    places = rng.permutation(grid.reshape(-1, 2))[: bright + faint]
+    for k, (x, y) in enumerate(places.tolist()):
+        cv2.circle(image, (x, y), 6, 230.0 if k < bright else 107.0, -1, cv2.LINE_AA)
+    image = cv2.GaussianBlur(image, (0, 0), 3.0)
+    return np.repeat(image[:, :, None], 3, axis=2).astype(np.uint8)
+
+
+@pytest.mark.parametrize(("bright", "faint"), [(70, 0), (20, 350)])
+def test_a_pan_over_a_plain_wall_is_found(bright, faint):
+    """Some 17 dots are in view at a time, or five bright and 85 faint ones; from any frame to the
+    next one that is followed, most stay.
+    """
+    truth = exp(np.linspace(-0.35, 0.35, 60)[:, None] * [0.0, 1.0, 0.0])
+    wall = plain_wall(bright, faint)
+    found = follow(view(wall, R) for R in truth)
+    assert angle_deg(found.R_first_camera, truth[0].T @ truth).max() < 0.4
+
+
 def test_a_short_blackout_is_bridged(panorama):
     truth = exp(np.linspace(0, 0.3, 48)[:, None] * [0.0, 1.0, 0.0])
     pictures = [view(panorama, R) for R in truth]
