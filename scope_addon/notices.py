@@ -264,6 +264,8 @@ REASONS = {
     "floating": "floats above the floor: check these frames",
     "leap": "moves faster than anybody can: the footage may leave out what happened, or somebody "
     "else is followed from there on",
+    "spin": "turns faster than anybody can: check these frames",
+    "snap": "a hand or foot moves faster than anybody can: check these frames",
 }
 _SEVERAL_FLOORS = (
     "the clip has more than one floor: capture the part that matters, with a start and end time, "

@@ -150,15 +150,16 @@ def test_an_imported_motion_which_no_camera_has_seen_is_not_judged() -> None:
 
 
 def test_a_body_that_is_elsewhere_from_one_frame_to_the_next_is_found() -> None:
-    """Beside where it was, as in footage that leaves a second out; not a little, nor nearer, which
-    one camera measures badly, nor at a cut, nor somebody who is as fast for a while.
+    """Beside where it was, as in footage that leaves a second out, or nearer; not a little, nor at
+    a cut, nor somebody who is as fast for a while.
     """
     across = np.zeros((len(WALK), 3))
     across[90:, 0] = 1.0
     leaps = moved(dict.fromkeys(AT, across))
     assert np.flatnonzero(implausible(leaps)["leap"]).tolist() == [89, 90]
     assert not implausible(moved(dict.fromkeys(AT, 0.2 * across)))["leap"].any()
-    assert not implausible(moved(dict.fromkeys(AT, across[:, [1, 0, 2]])))["leap"].any()
+    nearer = moved(dict.fromkeys(AT, across[:, [1, 0, 2]]))
+    assert np.flatnonzero(implausible(nearer)["leap"]).tolist() == [89, 90]
     assert not implausible(replace(leaps, scene_starts=np.array([90])))["leap"].any()
     seen = WALK.valid.copy()
     seen[80:90] = False
@@ -265,3 +266,80 @@ def test_a_leap_that_smoothing_spreads_over_frames_is_found_at_any_rate(fps: int
     shift_m = np.clip((np.arange(len(WALK)) - 90) / (0.1 * fps), 0.0, 1.0)
     found = implausible(standing(shift_m, fps))["leap"]
     assert np.flatnonzero(found).tolist() == list(range(90, 91 + fps // 10))
+
+
+@pytest.mark.parametrize("fps", [30, 60, 120])
+@pytest.mark.parametrize("end", ["left_ankle", "right_wrist"])
+def test_a_limb_that_is_elsewhere_from_one_frame_to_the_next_is_found(end: str, fps: int) -> None:
+    """By half a metre; not by 5 cm, nor at a cut, nor in a sixth of a second, as in a kick."""
+    across = np.zeros((len(WALK), 3))
+    across[90:, 0] = 0.5
+
+    def at_rate(shift_m: np.ndarray) -> Motion:
+        still = standing(np.zeros(len(WALK)), fps)
+        joints = still.joints_cam.astype(float)
+        R = still.world_from_camera[:, :3, :3]
+        joints[:, AT[end]] += np.einsum("tji,tj->ti", R, shift_m)
+        return replace(still, joints_cam=joints.astype(np.float32))
+
+    found = implausible(at_rate(across))
+    rows = np.flatnonzero(found.pop("snap"))
+    assert {89, 90} <= set(rows.tolist())
+    assert np.abs(rows - 89.5).max() / fps < 0.06
+    assert not any(frames.any() for frames in found.values())
+    assert not implausible(at_rate(0.1 * across))["snap"].any()
+    cut = replace(at_rate(across), scene_starts=np.array([90]))
+    assert not implausible(cut)["snap"].any()
+    t = np.clip((np.arange(len(WALK)) - 90) / (fps / 6), 0.0, 1.0)
+    across[:, 0] = 0.5 * (1.0 - np.cos(np.pi * t))
+    assert not implausible(at_rate(across))["snap"].any()
+
+
+@pytest.mark.parametrize("acting", [boxing, sprinting])
+def test_what_a_limb_can_do_is_no_snap(acting: Callable[[], np.ndarray]) -> None:
+    at = acting()
+    T = WALK.world_from_camera
+    joints = WALK.joints_cam.astype(float)
+    joints[:, : at.shape[1]] = (at - T[:, None, :3, 3]) @ T[:, :3, :3]
+    acted = replace(WALK, joints_cam=joints.astype(np.float32))
+    assert not implausible(acted)["snap"].any()
+    assert not implausible(acted)["spin"].any()
+
+
+def turned(degrees: np.ndarray) -> Motion:
+    """Return a standing person who is turned by (T,) degrees."""
+    still = standing(np.zeros(len(WALK)), 30.0)
+    at = joints_in_world(still)
+    pelvis = at[:, :1]
+    c = np.cos(np.radians(degrees))[:, None]
+    s = np.sin(np.radians(degrees))[:, None]
+    x, y, z = np.moveaxis(at - pelvis, 2, 0)
+    at = pelvis + np.stack([c * x - s * y, s * x + c * y, z], axis=2)
+    T = still.world_from_camera
+    joints = still.joints_cam.astype(float)
+    joints[:, : at.shape[1]] = (at - T[:, None, :3, 3]) @ T[:, :3, :3]
+    return replace(still, joints_cam=joints.astype(np.float32))
+
+
+def test_a_body_that_faces_the_other_way_at_once_is_found() -> None:
+    """Within a tenth of a second; not in half a second, nor a dancer's pirouettes."""
+    frames = np.arange(len(WALK)) - 90
+    found = implausible(turned(np.clip(60.0 * frames, 0.0, 180.0)))["spin"]
+    assert np.flatnonzero(found).tolist() == [90, 91, 92, 93]
+    assert not implausible(turned(np.clip(12.0 * frames, 0.0, 180.0)))["spin"].any()
+    assert not implausible(turned(np.clip(30.0 * frames, 0.0, 1800.0)))["spin"].any()
+
+
+def test_a_body_that_misses_the_footage_for_its_size_is_found() -> None:
+    """By 8 cm at its distance for a third of a second; not for a moment, nor by 3 cm."""
+    walk_past = seen_at(joints_in_world(WALK))
+    px_per_m = walk_past.intrinsics[0, 0] / walk_past.joints_cam[:, AT["pelvis"], 2]
+    during = np.zeros(len(WALK))
+    during[60:70] = 1.0
+    found = implausible(replace(walk_past, residual_px=0.08 * px_per_m * during))["far"]
+    assert np.flatnonzero(found).tolist() == list(range(60, 70))
+    missed = replace(walk_past, residual_px=0.08 * px_per_m * during)
+    assert [(s.reason, s.first, s.last) for s in find_review_spans(missed)] == [("far", 60, 69)]
+    assert not implausible(replace(walk_past, residual_px=0.03 * px_per_m * during))["far"].any()
+    during[63:] = 0.0
+    assert not implausible(replace(walk_past, residual_px=0.08 * px_per_m * during))["far"].any()

@@ -40,6 +40,8 @@ _SHORT = {
     "lean": "leans",
     "floating": "floats",
     "leap": "leaps",
+    "spin": "spins",
+    "snap": "limb snaps",
     "warned": "warning",
 }
 _MAX_SPANS = 60  # that the page lists

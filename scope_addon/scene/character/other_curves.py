@@ -61,6 +61,8 @@ MARKER_NAMES = {
     "lean": "leans",
     "floating": "floats",
     "leap": "leaps",
+    "spin": "spins",
+    "snap": "limb snaps",
 }
 _MAX_MARKERS = 40  # more would clutter the timeline
 _GAP_S = 0.5  # spans closer than this share a marker
