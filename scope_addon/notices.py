@@ -218,6 +218,12 @@ SENTENCES = {
     "posed_bones": "the pose of these bones of '{rig}', which are not in the list, moves or turns "
     "the motion: {bones:names}; clear it in Pose Mode (Alt G, Alt R, Alt S) for the motion as "
     "captured",
+    "nla_bones": "NLA tracks of '{rig}' move or turn bones that are not in the list, and the "
+    "motion with them: {bones:names}; mute these tracks for the motion as captured",
+    "unlisted_fingers": "fingers were captured, but the bone map of '{rig}' has none of the bones "
+    "below {hands:names}, which stay as they are: add the fingers to the map",
+    "kept_action": "the action '{action}' was edited after Retarget wrote it: it is kept in the "
+    "file, but '{rig}' has the new one",
     "modifiers_left_out": "{file} does not show '{mesh}' as its modifiers do: {modifiers:names}; "
     "apply or remove these, and export again",
     "bends_left_out": "{file} lacks the bends of these bones of '{rig}', as no such file can hold "

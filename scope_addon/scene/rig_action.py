@@ -171,7 +171,7 @@ def retire(former: Action | None, source: str) -> None:
     if former is None:
         return
     is_same = former.get(KEYS_OF, source) == source
-    if is_same and former.get(_CHECKSUM) == _checksum(former) and former.users == 0:
+    if is_same and is_retargeted(former) and not is_edited(former) and former.users == 0:
         bpy.data.actions.remove(former)
     else:
         former.use_fake_user = True
@@ -190,15 +190,20 @@ def replace_action(rig: Object, former: Action | None, source: str) -> None:
 
 def retime_written_keys(action: Action, retiming: Retiming) -> None:
     """Move the keys of a retargeted action; it counts as edited only if it was."""
-    unedited = action.get(_CHECKSUM) == _checksum(action)
+    edited = is_edited(action)
     retime_keys(fcurves_of(action), retiming)
-    if unedited:
+    if not edited:
         mark_written(action)
 
 
 def is_retargeted(action: Action) -> bool:
     """Return whether retargeting has written the action."""
     return _CHECKSUM in action
+
+
+def is_edited(action: Action) -> bool:
+    """Return whether the keys of an action that retargeting has written were changed since."""
+    return is_retargeted(action) and action[_CHECKSUM] != _checksum(action)
 
 
 def _checksum(action: Action) -> str:

@@ -346,7 +346,10 @@ def blocked_bones(
             rig.pose.bones[key.bone].matrix_basis = basis_of(key, t)
         seen = _matrices(rig, names)
         expected = np.concatenate([wanted[t], wanted[t, followed] @ R_bone_twin])
-        cosine = (np.einsum("bij,bij->b", unscaled(seen[:, :3, :3]), expected) - 1) / 2
+        R = unscaled(seen[:, :3, :3])
+        cosine = (np.einsum("bij,bij->b", R, expected) - 1) / 2
+        # Bones that only follow may share a roll with others: what counts is where they point.
+        cosine[len(keys) :] = np.einsum("bi,bi->b", R[..., 1], expected[..., 1])[len(keys) :]
         off = np.maximum(off, np.arccos(np.clip(cosine, -1, 1)))
         size = np.ptp(seen[:, :3, 3], axis=0).max()
         shift = max(shift, np.linalg.norm(seen[root, :3, 3] - heads[t]) / size)
@@ -383,7 +386,7 @@ def _is_driven(rig: Object, key: BoneMotion) -> bool:
 
 
 def posed_bones(rig: Object, names: Sequence[str]) -> list[Notice]:
-    """Return a warning about bones above mapped ones that are posed, or that the NLA poses: they
+    """Return warnings about bones above mapped ones that are posed, or that the NLA poses: they
     move the motion, which was measured with them at rest.
 
     :param names: of the mapped bones.
@@ -392,16 +395,17 @@ def posed_bones(rig: Object, names: Sequence[str]) -> list[Notice]:
         bone.name for name in names for bone in rig.data.bones[name].parent_recursive
     )
     in_nla = {curve.data_path for curve in nla_fcurves(rig) if _leaves_rest(curve)}
-    moving = [
-        name
-        for name in above
-        if name not in names
-        and (
-            _is_posed(rig.pose.bones[name])
-            or any(bone_path(name, channel) in in_nla for channel in _AT_REST)
-        )
+    others = [name for name in above if name not in names]
+    by_nla = [
+        name for name in others if any(bone_path(name, channel) in in_nla for channel in _AT_REST)
     ]
-    return [notice("posed_bones", bones=moving, rig=rig.name)] if moving else []
+    posed = [name for name in others if name not in by_nla and _is_posed(rig.pose.bones[name])]
+    notices = []
+    if posed:
+        notices.append(notice("posed_bones", bones=posed, rig=rig.name))
+    if by_nla:
+        notices.append(notice("nla_bones", bones=by_nla, rig=rig.name))
+    return notices
 
 
 def _is_posed(bone: PoseBone) -> bool:

@@ -43,6 +43,7 @@ from .face_retarget import captured_expressions, face_keys, key_face, rest_face
 from .packed_motion import apart_at_cuts
 from .rig_action import (
     clear_offsets,
+    is_edited,
     leave_tweak_mode,
     mark_written,
     remember_motion,
@@ -199,15 +200,23 @@ def retarget(
 
     :param betas: (P,) shape coefficients of the captured person.
     :param rate: scene frames per second.
-    :raises UsageError: when the rig is the source, or lacks a mapped bone or all controls of the
-        face.
+    :raises UsageError: when the rig is the source, lacks a mapped bone or all controls of the
+        face, or is in the Rest Position of a library.
     :raises InputError: when a map cannot be used, or a mapped bone does not move.
     """
     options = options or RetargetOptions()
     bone_map = usable_map(source, body, rig, bone_map)
+    if rig.data.library is not None and rig.data.pose_position == "REST":
+        raise UsageError(
+            f"'{rig.name}' would not move once this file is opened again: its armature is linked "
+            f"from {rig.data.library.filepath} and shown in Rest Position; set it to Pose Position "
+            "there, or make an override of the armature data as well"
+        )
     clip, frames = read_clip(source, body, rate)
     clip = clip_as_displayed(source, clip, frames)
-    bone_map = _without_unseen_hands(bone_map, body, clip)
+    seen = _seen_parts(body, clip)
+    unlisted = _unlisted_fingers(rig, bone_map, seen)
+    bone_map = _with_parts(bone_map, seen)
     captured = captured_expressions(source) if options.face is not None else None
     face = (
         face_keys(captured, rig, options.face)
@@ -249,7 +258,7 @@ def retarget(
             keys[root] = replace(
                 keys[root], locations=root_locations(rig, place, skeleton, root, motion.heads)
             )
-            warnings = map_notices(rig, bone_map)
+            warnings = map_notices(rig, bone_map) + unlisted
             warnings += blocked_bones(rig, keys, motion.rotations, motion.heads)
             keys += ik_keys(rig, keys)
         warnings += posed_bones(rig, skeleton.names)
@@ -262,6 +271,8 @@ def retarget(
         _set_parent(rig, frames, motion)
         if is_cyclic(source):
             _repeat(rig, action, keys)
+        if former is not None and is_edited(former):
+            warnings.append(notice("kept_action", rig=rig.name, action=former.name))
         replace_action(rig, former, source.name)
     clear_offsets(rig, [key.bone for key in keys])
     if face is not None:
@@ -309,18 +320,35 @@ def usable_map(source: Object | None, body: Body, rig: Object, bone_map: BoneMap
     return _with_parts(bone_map, set(body.joint_names))
 
 
-def _without_unseen_hands(bone_map: BoneMap, body: Body, clip: Clip) -> BoneMap:
-    """Return the bone map without the fingers of hands that were not captured: theirs are at rest
-    in every frame.
+def _seen_parts(body: Body, clip: Clip) -> set[str]:
+    """Return the body's parts without the fingers of hands that were not captured: theirs are at
+    rest in every frame.
     """
     names = body.joint_names
-    kept = set(names)
+    seen = set(names)
     for side in ("left", "right"):
         fingers = {f"{side}_{phalanx}" for phalanx in PHALANGES}.intersection(names)
         rotations = clip.rotations[:, [names.index(finger) for finger in fingers]]
         if np.abs(rotations - np.eye(3)).max(initial=0.0) < _AT_REST:
-            kept -= fingers
-    return _with_parts(bone_map, kept)
+            seen -= fingers
+    return seen
+
+
+def _unlisted_fingers(rig: Object, bone_map: BoneMap, seen: set[str]) -> list[Notice]:
+    """Return a warning about hands whose fingers were captured, and are bones of the rig, but not
+    in the map.
+
+    :param seen: the parts of the body that were captured.
+    """
+    hands = []
+    for side in ("left", "right"):
+        fingers = {f"{side}_{phalanx}" for phalanx in PHALANGES} & seen
+        hand = bone_map.bone(f"{side}_wrist")
+        if fingers and hand and fingers.isdisjoint(bone_map.parts.values()):
+            below = rig.data.bones[hand].children_recursive
+            if len(below) > 1:  # not the end of the hand alone
+                hands.append(hand)
+    return [notice("unlisted_fingers", rig=rig.name, hands=hands)] if hands else []
 
 
 def _with_parts(bone_map: BoneMap, kept: set[str]) -> BoneMap:

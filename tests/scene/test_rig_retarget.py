@@ -7,6 +7,7 @@ import pytest
 from mathutils import Matrix, Vector
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.retarget.bone_map import BoneMap
+from scope.scope_addon.scene.datablocks import action_of
 from scope.scope_addon.scene.export.export import ExportOptions
 from scope.scope_addon.scene.rig_file import export_rig
 from scope.scope_addon.scene.rig_retarget import guess_bone_map
@@ -469,6 +470,54 @@ def test_bones_that_carry_the_skin_and_do_not_follow_those_in_the_list_are_repor
     assert run(source, rig).warnings == []
 
 
+def test_bones_that_follow_with_another_roll_are_not_reported(source):
+    """As the copies of Rigify's thumbs do."""
+    rig, bone_of = build_rig("unreal")
+    with_deform_bones(rig)
+    copy = rig.pose.bones[f"DEF_{bone_of['left_elbow']}"]
+    roll = copy.constraints.new("TRANSFORM")
+    roll.target = rig
+    roll.subtarget = bone_of["pelvis"]
+    roll.map_to = "ROTATION"
+    roll.to_min_y_rot = roll.to_max_y_rot = 0.6
+    roll.mix_mode_rot = "ADD"
+    roll.target_space = roll.owner_space = "LOCAL"
+    bpy.context.view_layer.update()
+    elbow = rig.pose.bones[bone_of["left_elbow"]].matrix.to_quaternion()
+    turn = elbow.rotation_difference(copy.matrix.to_quaternion())
+    assert turn.angle > 0.5
+    assert run(source, rig).warnings == []
+
+
+def test_an_edited_action_is_said_to_be_kept(source):
+    rig, bone_of = build_rig("unreal")
+    run(source, rig)
+    assert run(source, rig).warnings == []  # which removed the first one
+    before = rig.animation_data.action
+    rig.pose.bones[bone_of["head"]].keyframe_insert("scale", frame=3)
+    (warning,) = run(source, rig).warnings
+    assert (warning.code, warning.values["action"]) == ("kept_action", before.name)
+    assert before.use_fake_user
+    assert rig.animation_data.action != before
+
+
+def test_a_linked_rest_position_which_would_come_back_is_refused(source, tmp_path):
+    rig, _ = build_rig("unreal")
+    rig.data.pose_position = "REST"
+    path = str(tmp_path / "library.blend")
+    bpy.data.libraries.write(path, {rig})
+    with bpy.data.libraries.load(path, link=True) as (_, chosen):
+        chosen.objects = [rig.name]
+    (linked,) = chosen.objects
+    bpy.context.scene.collection.objects.link(linked)
+    override = linked.override_create()
+    bpy.context.scene.collection.objects.link(override)
+    with pytest.raises(UsageError, match="set it to Pose Position there"):
+        run(source, override, guess_bone_map(rig))
+    assert override.data.pose_position == "REST"
+    assert action_of(override) is None
+
+
 def test_bones_blocked_by_a_constraint_are_reported(source):
     rig, bone_of = build_rig("unreal")
     assert run(source, rig).warnings == []
@@ -541,6 +590,8 @@ def test_a_bone_that_carries_the_rig_and_is_posed_is_reported(source, pose):
     warnings = run(source, rig).warnings
     is_moved = pose not in (_at_rest_in_the_nla, None)
     assert [w.values["bones"] for w in warnings] == [["Master"]] * is_moved
+    if is_moved:  # which clearing the pose does not settle
+        assert warnings[0].code == ("nla_bones" if pose is _in_the_nla else "posed_bones")
     if not is_moved:
         assert direction_error(rig, bone_of, ARMS, JOINTS) < 1.0
     elif pose is _turned:  # so that it is said for a reason

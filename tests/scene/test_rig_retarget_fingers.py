@@ -174,6 +174,19 @@ def test_the_palms_of_hands_with_fewer_fingers_are_aligned(source):
         assert angles(np.cross(i - w, r - w), np.cross(I - W, R - W)).max() < 1.0, side
 
 
+def test_captured_fingers_that_the_map_lacks_are_reported(source):
+    rig, bone_of = build_hands("unreal")
+    parts = guess_bone_map(rig).parts
+    plain = {bone: part for bone, part in parts.items() if part[:-1].split("_")[-1] not in FINGERS}
+    (warning,) = run(source, rig, BoneMap(plain), body=HANDS).warnings
+    hands = [bone_of["left_wrist"], bone_of["right_wrist"]]
+    assert (warning.code, warning.values["hands"]) == ("unlisted_fingers", hands)
+    thumbs = plain | {bone: part for bone, part in parts.items() if "thumb" in part}
+    assert run(source, rig, BoneMap(thumbs), body=HANDS).warnings == []
+    without, _ = build_rig("unreal")
+    assert run(source, without, body=HANDS).warnings == []
+
+
 @pytest.mark.slow
 def test_fingers_of_rigify(source, rigify_rigs):
     for rig, prefix in rigify_rigs:
