@@ -153,6 +153,11 @@ SENTENCES = {
     "or more; check how far they travel",
     "travel_by_lens": "{footage}: the camera travels, and its focal length is a guess, so the "
     "people's paths may be wrong by {percent:.0f} %; give the focal length or the field of view",
+    "turn_by_lens": "{footage}: the camera turns by {degrees:.0f} degrees, if its focal length is "
+    "as assumed; if not, straight paths become arcs, and people lean; give the focal length or the "
+    "field of view (--focal or --fov on the command line)",
+    "lost_turn": "{footage}: the camera's rotation is unknown {times:times}, because too little of "
+    "the background could be followed; the people's rotation and paths may be wrong from there on",
     "zoom": "{footage}: the lens zooms, but by how much is not known everywhere, because the "
     "camera also travels, or too little of the background is seen, so people may come nearer or go "
     "away wrongly; capture the parts without zoom separately, with a start and end time",

@@ -35,8 +35,10 @@ from .world.world_frame import GIVEN, LINES, UP_DEVIATIONS_DEG
 
 GIVEN_FLOOR_M = 0.03  # of the floor above or below z = 0 in the world of a given path
 # With this relative deviation of the focal length or more, as of an estimate from few edges of the
-# background or none, the path of a travelling camera is unsure.
+# background or none, the path of a travelling camera is unsure, and so is how far one turns.
 UNSURE_LENS = 0.15
+UNSURE_TURN_DEG = 20.0  # from which on that is seen
+LOST_STEPS = 1.5  # between frames of known rotation, of the median one: one is lost
 # Frames that repeat the one before change by less than this share of the largest changes that are
 # so near before and after them. Of 32 clips without such frames, at most 4 % of the frames do; of
 # five that were converted from lower rates, 18 % and more.
@@ -178,6 +180,8 @@ def camera_warnings(name: str, footage: Footage, solved: Solved) -> list[Notice]
     elif solved.travel_source is not None and footage.camera.focal_deviation >= UNSURE_LENS:
         percent = 100.0 * footage.camera.focal_deviation
         warnings.append(notice("travel_by_lens", footage=name, percent=percent))
+    elif solved.travel_source is None:
+        warnings += turn_warnings(name, footage)
     if footage.world_from_camera is not None:
         lowered_m = (
             footage.world_from_camera[0, 2, 3] - solved.motions[0].world_from_camera[0, 2, 3]
@@ -189,6 +193,24 @@ def camera_warnings(name: str, footage: Footage, solved: Solved) -> list[Notice]
         if contradicts is not None:
             starts = [float(times[first]) for first, _ in runs(contradicts)]
             warnings.append(notice("strides", footage=name, person=person, times=starts))
+    return warnings
+
+
+def turn_warnings(name: str, footage: Footage) -> list[Notice]:
+    """Say where the rotation of a camera that turns and does not travel is not known."""
+    motion = footage.camera_motion
+    if motion.is_static or footage.world_from_camera is not None:
+        return []
+    warnings = []
+    turn_deg = motion.largest_turn_deg
+    if footage.camera.focal_deviation >= UNSURE_LENS and turn_deg >= UNSURE_TURN_DEG:
+        warnings.append(notice("turn_by_lens", footage=name, degrees=turn_deg))
+    times = footage.timestamps[motion.known]
+    steps = np.diff(times)
+    is_cut = np.diff(np.searchsorted(footage.cuts_s, times)) > 0
+    begins = times[:-1][(steps > LOST_STEPS * np.median(steps)) & ~is_cut]
+    if len(begins):
+        warnings.append(notice("lost_turn", footage=name, times=begins.tolist()))
     return warnings
 
 

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture import reporting
+from scope.scope_addon.capture.camera.background_record import CameraMotion
 from scope.scope_addon.capture.camera.intrinsics import assumed_camera
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.options import capture_options
@@ -188,12 +189,54 @@ def test_feet_that_are_still_under_the_floor(body):
     assert found == ["a.mp4: a foot of the person is up to 5 cm under the floor in 7 of 90 frames"]
 
 
+def turning(degrees, lost=()):
+    """A camera that pans by so much, followed in every third frame, but not in the lost ones."""
+    known = np.arange(T) % 3 == 0
+    known[list(lost)] = False
+    angles = np.radians(degrees) * np.linspace(0.0, 1.0, T)
+    return CameraMotion(rotations.exp(angles[:, None] * [0.0, 1.0, 0.0]), known)
+
+
+def about_turns(motion, camera_motion, deviation=0.25, cuts_s=()):
+    """The codes and sentences of warnings of a camera that does not travel."""
+    camera = replace(assumed_camera(1280, 720, (1280, 720)), focal_deviation=deviation)
+    footage = SimpleNamespace(
+        zoom=None,
+        timestamps=motion.timestamps,
+        cuts_s=list(cuts_s),
+        world_from_camera=None,
+        camera=camera,
+        camera_motion=camera_motion,
+    )
+    solved = SimpleNamespace(travel_source=None, motions=[motion], contradictions=[None])
+    return {each.code: str(each) for each in camera_warnings("made.mp4", footage, solved)}
+
+
+def test_a_camera_that_turns_much_behind_a_lens_that_is_assumed_is_told(motion):
+    said = about_turns(motion, turning(50.0))
+    assert list(said) == ["turn_by_lens"]
+    assert "turns by 50 degrees" in said["turn_by_lens"]
+    assert not about_turns(motion, turning(50.0), deviation=0.05)
+    assert not about_turns(motion, turning(10.0))
+    assert not about_turns(motion, turning(0.0))
+
+
+def test_when_the_rotation_of_a_turning_camera_is_lost_is_told(motion):
+    """Frames 60 and 63 are lost, at 2.0 s; of a camera on a tripod, nothing is."""
+    said = about_turns(motion, turning(10.0, lost=(60, 63)))
+    assert list(said) == ["lost_turn"]
+    assert "unknown at 1.9 s, because" in said["lost_turn"]
+    assert not about_turns(motion, turning(0.0, lost=(60, 63)))
+    assert not about_turns(motion, turning(10.0, lost=(60, 63)), cuts_s=[2.0])
+
+
 @pytest.mark.parametrize(("is_certain", "codes"), [(True, []), (False, ["zoom"])])
 def test_a_zoom_of_which_some_may_be_missing_is_told(motion, is_certain, codes):
     footage = SimpleNamespace(
         zoom=SimpleNamespace(is_certain=is_certain),
         timestamps=motion.timestamps,
         world_from_camera=None,
+        camera_motion=turning(0.0),
     )
     solved = SimpleNamespace(travel_source=None, motions=[motion], contradictions=[None])
     warnings = camera_warnings("made.mp4", footage, solved)
