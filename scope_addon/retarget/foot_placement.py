@@ -172,7 +172,9 @@ def _rig_foot(
     ball = AF @ ((rig.heads[toe] if toe is not None else rig.ends[ankle]) - rig.heads[ankle])
     length = float(np.linalg.norm(ball_of_body[:2]))
     share = float(np.linalg.norm(ball[:2])) / length
-    if not 0.3 * scale < share < 3 * scale or ball @ ball_of_body < 0:
+    # A bone for the toes shows where the ball is, however long the foot of a short leg.
+    longest = 3 * scale if toe is None else np.inf
+    if not 0.3 * scale < share < longest or ball @ ball_of_body < 0:
         share = scale
         ball = np.array([*(scale * ball_of_body[:2]), -0.8 * height])
     # No bone ends at the heel, so its position is proportional to the body's.

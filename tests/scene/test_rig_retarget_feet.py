@@ -4,6 +4,7 @@
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 from scope.solver.rotations import exp
 
 from ..edit.rolling import STRIDE, joint, rolling_walk
@@ -108,6 +109,24 @@ def test_a_rig_whose_bones_do_not_inherit_rotation_moves_as_one_whose_bones_do()
         bone.use_inherit_rotation = False
     run(source, rig)
     np.testing.assert_allclose(seen(rig, bone_of.values(), frames), wanted, atol=1e-3)
+
+
+def test_feet_that_are_long_for_their_legs_stay_above_the_floor(source):
+    """As of a cartoon character: the ball is more than three times as far from the ankle as the
+    body's, scaled.
+    """
+    rig, bone_of = build_rig("unreal")
+    bpy.ops.object.mode_set(mode="EDIT")
+    for side in STANDS:
+        ankle, ball = (rig.data.edit_bones[bone_of[f"{side}_{part}"]] for part in ("ankle", "foot"))
+        ahead = (ball.head - ankle.head) * Vector((3.0, 3.0, 0.0))
+        for end in ("head", "tail"):
+            setattr(ball, end, getattr(ball, end) + ahead)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    run(source, rig)
+    feet = points(rig, [(bone_of[f"{side}_ankle"], bone_of[f"{side}_foot"]) for side in STANDS])
+    for moved, rest in feet:
+        assert (moved[:, 1, 2] - rest[1, 2]).min() > -0.01
 
 
 def feet_of_lowered_walk(by):
