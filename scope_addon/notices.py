@@ -155,7 +155,7 @@ SENTENCES = {
     "people's paths may be wrong by {percent:.0f} %; give the focal length or the field of view",
     "turn_by_lens": "{footage}: the camera turns by {degrees:.0f} degrees, if its focal length is "
     "as assumed; if not, straight paths become arcs, and people lean; give the focal length or the "
-    "field of view (--focal or --fov on the command line)",
+    "field of view (--focal-mm or --fov on the command line)",
     "lost_turn": "{footage}: the camera's rotation is unknown {times:times}, because too little of "
     "the background could be followed; the people's rotation and paths may be wrong from there on",
     "zoom": "{footage}: the lens zooms, but by how much is not known everywhere, because the "
