@@ -58,15 +58,16 @@ def differs(scene: Scene) -> bool:
 
 
 def keyed_for(scene: Scene) -> float:
-    """Return the frame rate that captured motion was keyed for, if the scene has another one;
-    otherwise 0.
+    """Return the frame rate that captured motion was keyed for, that of the shown capture first,
+    if the scene has another one; otherwise 0.
 
     Blender's importer of FBX files, for example, sets the scene's frame rate, which changes the
-    speed of all keys; and a person may be appended from a file of another rate.
+    speed of all keys; so does a motion that is imported with its rate. A person may be appended
+    from a file of another rate.
     """
     now = scene.render.fps / scene.render.fps_base
     capture = shown_capture(scene)
-    people = people_of(capture) if capture else people_in(scene)
+    people = [*(people_of(capture) if capture else ()), *people_in(scene)]
     rates = [stored_rate(person, now) for person in people]
     return next((rate for rate in rates if abs(rate - now) > _SAME), 0.0)
 

@@ -135,6 +135,17 @@ def test_a_rate_that_an_importer_has_changed_is_noticed_and_restored(scene):
     np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-4)
 
 
+def test_a_capture_that_another_one_with_its_rate_has_slowed_is_noticed(scene):
+    person = built()
+    before = at_times(person, NAMES)
+    second = build_scene([motion_of(walk(2.0))], BODY, None, BuildOptions(frame_rate="set"))
+    scene.scope.capture = second.collection
+    assert keyed_for(scene) == 20
+    bpy.ops.scope.match_frame_rate()
+    assert keyed_for(scene) == 0
+    np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-4)
+
+
 def key_times(owner):
     """Return the scene frames of all keys of an object, curve by curve."""
     return [read_keys(curve)[:, 0].tolist() for curve in fcurves(owner)]
