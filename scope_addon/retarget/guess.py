@@ -148,7 +148,7 @@ def _is_impossible(rest: RestPose, parts: Mapping[str, str]) -> bool:
 
 def _lacking(named: Mapping[str, str], shaped: Mapping[str, str]) -> dict[str, str]:
     """Return the bones, by the shape, of parts of which names give none: of whole limbs, and beside
-    parts for which names and shape have the same bone.
+    parts for which names and shape have the same bone, or this has found one.
     """
     if not named:
         return dict(shaped)
@@ -164,8 +164,11 @@ def _lacking(named: Mapping[str, str], shaped: Mapping[str, str]) -> dict[str, s
         if kind:
             place = limb.index(kind)
             beside = {f"{side}_{each}" for each in limb[max(place - 1, 0) : place + 2]}
+        elif part in SPINE and "pelvis" in agreed:
+            beside = set(SPINE)
         if _limb_of(part) not in limbs or beside & agreed:
             found[bone] = part
+            agreed.add(part)
     return found
 
 

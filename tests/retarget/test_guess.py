@@ -222,9 +222,18 @@ def test_a_mirrored_rig_has_feet_and_hands_whose_names_tell_only_the_side() -> N
     names = [telling[bone] for bone in bones.names]
     mirrored = RestPose(names, bones.parents, bones.heads * [-1.0, 1.0, 1.0])
     found = guess(mirrored, is_mirrored=True).parts
-    plain = guess(RestPose(names, bones.parents, bones.heads)).parts
-    assert {"left_ankle", "right_wrist", "left_collar"} <= set(plain.values())
-    assert found == {bone: other_side(part) for bone, part in plain.items()}
+    assert found == {telling[bone]: other_side(part) for bone, part in part_of.items()}
+
+
+@pytest.mark.parametrize("unknown", [("left_ankle", "left_foot"), ("spine1",)])
+def test_bones_whose_names_say_nothing_are_found_beside_others(unknown: tuple[str, ...]) -> None:
+    """A hoof follows an ankle that the shape alone shows, and a belly lies below a chest."""
+    bones, part_of = bones_of("unreal")
+    names = [
+        f"q{row}" if part_of[bone] in unknown else bone for row, bone in enumerate(bones.names)
+    ]
+    found = guess(RestPose(names, bones.parents, bones.heads)).parts
+    assert found == {name: part_of[bone] for name, bone in zip(names, bones.names, strict=True)}
 
 
 def doubled(bones: RestPose, first: str, second: str) -> RestPose:
