@@ -243,7 +243,8 @@ class SCOPE_OT_export(SavingOperator):
             collections = [c for c in collections if active and holds(c, active)]
             if not collections:
                 raise UsageError(
-                    "the active object belongs to no capture; select one of a capture's objects"
+                    "the active object belongs to no capture; select one of a capture's objects, "
+                    "or append the capture's collection rather than its objects"
                 )
         return collections
 
