@@ -259,6 +259,8 @@ def _footage(job: ObservationJob, path: GivenPath | None, observed: Observed) ->
     if path is None:
         record, zoom = record.steadied(job.camera, image_size)
     camera = job.background.camera(observed.background, zoom)
+    if path is None and zoom is None:
+        record, camera = job.background.by_turns(record, camera)
     times_s = np.array(observed.timestamps)
     given = None
     seen = motion = record.motion(job.camera, camera, image_size)

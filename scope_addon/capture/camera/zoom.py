@@ -6,6 +6,13 @@ frame is compared with a key frame; the frame before it becomes the next key fra
 longer explains the corners that both share, or where too few are left. A link from one key frame to
 the next thus ends for lack of corners if the lens zooms, but soon and with a small change of scale
 if the camera travels, because near corners pass by far ones.
+
+How a rotation moves the corners of one part of the picture otherwise than those of another depends
+on the focal length f: H = K R K⁻¹, K = diag(f, f, 1). The widest turn of each link tells it; what a
+lens distorts, or a crop off the centre moves, is alike in all links, so their agreement alone would
+promise too much.
+
+Source: Hartley 1997 (focal length of a camera that rotates).
 """
 
 from __future__ import annotations
@@ -15,7 +22,8 @@ from itertools import groupby
 
 import numpy as np
 
-from ...arrays import Float64Array
+from ....solver.rotations import log
+from ...arrays import Float64Array, IndexArray
 from ...kinematics.smoothing import interpolated_rotations
 from .corner_tracks import SAMPLES_HZ, SLOW_S, CornerTracks
 from .intrinsics import Camera
@@ -30,6 +38,15 @@ MIN_SHARE = 0.8  # of them that a turn explains
 MIN_STEP_SHARE = 0.5  # the same from one sighting to the next, so that a link goes on
 BRIEF = 4  # sightings, a third of a second, in which something else than travel hides the corners
 TRACKING_STEPS = 4  # of a turn that begins at that of the frame before
+
+# The focal length, see `focal_by_turns`.
+MIN_TURN = np.radians(4.0)  # of a link, by the assumed focal length
+MIN_TURNS = 2
+MIN_TURN_CORNERS = 30  # that its two sightings share
+MAX_TURN_ZOOM = 0.01  # logarithm, of links that turn alone
+MAX_SPREAD = 0.08  # of the logarithms of the focal length in the links
+SYSTEMATIC = 0.04  # relative error of a focal length however well the links agree
+LIMITS = (0.45, 2.3)  # of the true focal length over the assumed one
 
 
 @dataclass(frozen=True)
@@ -74,27 +91,94 @@ def find_zoom(
         return None
     seen = times[sightings.rows]
     steps = np.full(len(seen) - 1, np.nan)  # of the logarithm of the focal length
-    R_first_camera = np.tile(np.eye(3), (len(seen), 1, 1))
     for link in links:
         at = link.first
         end = at + len(link.turns)
         is_zoom = not link.is_travel and abs(link.log_zoom) >= MIN_ZOOM
         log_zooms = np.log([1.0, *(turn.zoom for turn in link.turns)])
         steps[at:end] = np.diff(log_zooms) if is_zoom or not travels else 0.0
+    log_zoom = np.concatenate([[0.0], np.cumsum(_without_gaps(steps, np.diff(seen)))])
+    known, kept = _with_pauses(seen)
+    return Zoom(
+        np.exp(np.interp(times, known, log_zoom[kept])),
+        _rotations(links, seen, times),
+        not travels and not np.isnan(steps).any(),
+    )
+
+
+def _with_pauses(seen: Float64Array) -> tuple[Float64Array, IndexArray]:
+    """Return times (m,) at which the camera is known, and which sighting (m,) tells it: corners are
+    kept only where they have moved, so after a pause, the last sample shows no motion.
+
+    :param seen: (n,) times of the sightings.
+    """
+    paused = np.flatnonzero(np.diff(seen) > SLOW_S + 1.0 / SAMPLES_HZ)
+    kept = np.insert(np.arange(len(seen)), paused + 1, paused)
+    return np.insert(seen, paused + 1, seen[paused + 1] - 1.0 / SAMPLES_HZ), kept
+
+
+def _rotations(links: list[_Link], seen: Float64Array, times: Float64Array) -> Float64Array:
+    """Return the camera's rotations (T, 3, 3) at ``times``, as far as the assumed focal length is
+    right.
+
+    :param seen: (n,) times of the sightings.
+    """
+    R_first_camera = np.tile(np.eye(3), (len(seen), 1, 1))
+    for link in links:
+        at = link.first
+        end = at + len(link.turns)
         rotations = np.array([turn.assumed_rotation.T for turn in link.turns])
         R_first_camera[at + 1 : end + 1] = R_first_camera[at] @ rotations
         R_first_camera[end + 1 :] = R_first_camera[end]
-    log_zoom = np.concatenate([[0.0], np.cumsum(_without_gaps(steps, np.diff(seen)))])
-    # Corners are kept only where they have moved: after a pause, the last sample shows no motion.
-    paused = np.flatnonzero(np.diff(seen) > SLOW_S + 1.0 / SAMPLES_HZ)
-    kept = np.insert(np.arange(len(seen)), paused + 1, paused)
-    known = np.insert(seen, paused + 1, seen[paused + 1] - 1.0 / SAMPLES_HZ)
+    known, kept = _with_pauses(seen)
     within = np.clip(times, seen[0], seen[-1])
-    return Zoom(
-        np.exp(np.interp(within, known, log_zoom[kept])),
-        interpolated_rotations(R_first_camera[kept], known, within),
-        not travels and not np.isnan(steps).any(),
-    )
+    return interpolated_rotations(R_first_camera[kept], known, within)
+
+
+@dataclass(frozen=True)
+class TurnedLens:
+    """What the turns of a camera tell of it that neither travels nor zooms, in T frames."""
+
+    ratio: float  # of the focal length to the assumed one
+    deviation: float  # its relative error, one standard deviation
+    R_first_camera: Float64Array  # (T, 3, 3) as far as the assumed focal length is right
+
+
+def focal_by_turns(
+    corners: CornerTracks, times: Float64Array, camera: Camera, longer_side_px: float
+) -> TurnedLens | None:
+    """Return what the turns of a camera tell that neither travels nor zooms; None of any other, and
+    where it turns too little to tell.
+
+    :param times: (T,) seconds.
+    :param camera: the lens that is assumed.
+    :param longer_side_px: of the image.
+    """
+    sightings = Sightings.of(corners, camera, longer_side_px)
+    links = _links(sightings)
+    is_whole = sum(len(link.turns) for link in links) == len(sightings.rows) - 1
+    if not is_whole or any(link.is_travel for link in links):
+        return None
+    logs = []
+    for link in links:
+        angles = [float(np.linalg.norm(log(turn.assumed_rotation))) for turn in link.turns]
+        widest = int(np.argmax(angles))
+        turn = link.turns[widest]
+        shared = len(sightings.common(link.first, link.first + 1 + widest)[0])
+        if angles[widest] < MIN_TURN or shared < MIN_TURN_CORNERS:
+            continue
+        if abs(np.log(turn.zoom)) > MAX_TURN_ZOOM:
+            return None
+        logs.append(np.log(turn.focal))
+    if len(logs) < MIN_TURNS:
+        return None
+    middle = float(np.median(logs))
+    spread = float(1.48 * np.median(np.abs(np.array(logs) - middle)))
+    ratio = float(np.exp(middle))
+    if spread > MAX_SPREAD or not LIMITS[0] < ratio < LIMITS[1]:
+        return None
+    deviation = float(np.hypot(SYSTEMATIC, 1.25 * spread / np.sqrt(len(logs))))
+    return TurnedLens(ratio, deviation, _rotations(links, times[sightings.rows], times))
 
 
 def _without_gaps(steps: Float64Array, seconds: Float64Array) -> Float64Array:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The focal length from the edges of buildings and rooms.
+"""The focal length from the edges of buildings and rooms, or from the camera's own turns.
 
 Most edges follow three orthogonal directions. How many of them the best Manhattan directions
 explain (`manhattan`) depends on the focal length f:
@@ -26,6 +26,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,7 +38,7 @@ from ..camera.camera_rotation import BackgroundTracker
 from ..camera.intrinsics import Camera, assumed_camera, estimated_camera
 from ..camera.line_segments import Segments
 from ..camera.manhattan import Edges
-from ..camera.zoom import Zoom
+from ..camera.zoom import Zoom, focal_by_turns
 from .live_body import LiveBody
 
 KAPPA = 4.0
@@ -160,6 +161,26 @@ class BackgroundEstimators:
         if zoom is None:
             return camera
         return camera.zoomed(1.0 / zoom.factors[record.edge_frames[0].row])
+
+    def by_turns(self, record: BackgroundRecord, camera: Camera) -> tuple[BackgroundRecord, Camera]:
+        """Return the background and the camera whose focal length its own turns tell, if they tell
+        more than what was known: those given otherwise.
+
+        With a wrong focal length, the rotations of corners do not agree, and may have been lost;
+        with the turns, they are known throughout.
+        """
+        found = None
+        if camera.focal_deviation > 0.0:
+            found = focal_by_turns(
+                record.corners, record.times, self._given_camera, max(self._size)
+            )
+        if found is None or found.deviation >= camera.focal_deviation:
+            return record, camera
+        focal_px = found.ratio * float(self._given_camera.intrinsics[0, 0])
+        content = content_size(record.bars, *self._size)
+        known = np.ones(len(record.times), bool)
+        turned = replace(record, R_first_camera=found.R_first_camera, known=known, inlier_shares=[])
+        return turned, estimated_camera(*self._size, focal_px, found.deviation, content)
 
     def wait_for_solver(self, progress: Callable[[int], None]) -> None:
         """Wait until the solver is loaded.

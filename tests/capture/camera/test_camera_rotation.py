@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The camera's rotation, on pictures of a wall and a room seen by a camera of known rotation."""
 
+from types import SimpleNamespace
+
 import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker
-from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
+from scope.scope_addon.capture.camera.intrinsics import Camera, assumed_camera, pinhole
+from scope.scope_addon.capture.fitting.focal_length import BackgroundEstimators
 from scope.solver.rotations import exp, log
 
 WIDTH = 720
@@ -34,7 +37,7 @@ def panorama():
     return np.mean(layers, axis=0).astype(np.uint8)
 
 
-def view(panorama, R_first_camera):
+def view(panorama, R_first_camera, K=K):
     """The image of a rotated camera: the panorama is a plane at infinity in front of the first
     camera.
     """
@@ -121,6 +124,25 @@ def test_a_pan_over_a_plain_wall_is_found(bright, faint):
     wall = plain_wall(bright, faint)
     found = follow(view(wall, R) for R in truth)
     assert angle_deg(found.R_first_camera, truth[0].T @ truth).max() < 0.4
+
+
+def test_a_pan_shows_a_lens_twice_as_long_as_assumed(panorama):
+    """With the assumed lens, it would be 45 degrees; a lens that is given stays."""
+    size = (WIDTH, HEIGHT)
+    assumed = assumed_camera(*size, size)
+    long = pinhole(*size, 2.0 * assumed.intrinsics[0, 0])
+    truth = exp(np.linspace(-0.2, 0.2, 50)[:, None] * [0.0, 1.0, 0.0])
+    tracker = BackgroundTracker(assumed, *size)
+    for k, R in enumerate(truth):
+        tracker.add(view(panorama, R, long), k / FPS, [])
+    record = tracker.record()
+    nothing = SimpleNamespace(load=lambda: None)
+    with BackgroundEstimators(assumed, *size, nothing) as background:
+        turned, camera = background.by_turns(record, assumed)
+        assert background.by_turns(record, CAMERA) == (record, CAMERA)
+    assert camera.intrinsics[0, 0] == pytest.approx(long[0, 0], rel=0.06)
+    found = turned.motion(assumed, camera, size)
+    assert found.largest_turn_deg == pytest.approx(np.degrees(0.4), rel=0.06)
 
 
 def test_a_short_blackout_is_bridged(panorama):

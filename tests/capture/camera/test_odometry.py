@@ -13,7 +13,7 @@ from scope.scope_addon.capture.camera.corner_tracks import (
 )
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.camera.odometry import travel_of
-from scope.scope_addon.capture.camera.zoom import find_zoom
+from scope.scope_addon.capture.camera.zoom import find_zoom, focal_by_turns
 from scope.solver.rotations import exp, log
 
 WIDTH, HEIGHT = 1280, 720
@@ -45,14 +45,14 @@ def turning(rad_s):
     return R[0].T @ R
 
 
-def seen(R, center=AT_ORIGIN, focal_px=FOCAL_PX, outliers=0.0):
+def seen(R, center=AT_ORIGIN, focal_px=FOCAL_PX, outliers=0.0, places=STREET):
     """Return the tracks of corners (C, 3) in T frames, some of which move on their own."""
     rng = np.random.default_rng(1)
     focal = np.broadcast_to(focal_px, T)
-    walks = rng.random(len(STREET)) < outliers
+    walks = rng.random(len(places)) < outliers
     rows, numbers, points = [], [], []
     for k in range(T):
-        moved = STREET + walks[:, None] * [1.2 * TIMES[k], 0.0, 0.0]
+        moved = places + walks[:, None] * [1.2 * TIMES[k], 0.0, 0.0]
         p = (moved - center[k]) @ R[k]
         px = p[:, :2] / p[:, 2:] * focal[k] + [WIDTH / 2, HEIGHT / 2]
         inside = (p[:, 2] > 0.5) & (px >= 0).all(axis=1) & (px < [WIDTH, HEIGHT]).all(axis=1)
@@ -201,3 +201,56 @@ def test_corners_are_not_at_rest_for_a_camera_that_travels():
     corners = seen(STILL, TIMES[:, None] * [0.0, 0.0, -0.5] + SHAKE)
     assert not len(corners_at_rest(corners, STILL, camera(), 0.004))
     assert not len(corners_at_rest(CornerTracks.none(), STILL, camera(), 0.004))
+
+
+def around(n=700):
+    """Corners on all sides of the camera, not far above or below it, 3 to 30 m away."""
+    rng = np.random.default_rng(2)
+    angle = rng.uniform(-np.pi, np.pi, n)
+    level = np.stack([np.sin(angle), rng.uniform(-0.4, 0.4, n), np.cos(angle)], axis=1)
+    return rng.uniform(3, 30, n)[:, None] * level
+
+
+AROUND = around()
+
+
+def assumed(ratio):
+    """The lens that is assumed where the true focal length is so many times as long."""
+    return Camera(pinhole(WIDTH, HEIGHT, FOCAL_PX / ratio), np.zeros(5), "assumed")
+
+
+@pytest.mark.parametrize("ratio", [0.7, 1.0, 1.5, 2.0])
+def test_a_camera_that_turns_shows_its_focal_length(ratio):
+    """With corners that are off by 0.3 pixels, and some that move on their own."""
+    tracks = seen(turning(0.25), outliers=0.1, places=AROUND)
+    found = focal_by_turns(tracks, TIMES, assumed(ratio), WIDTH)
+    assert abs(np.log(found.ratio / ratio)) < 2.0 * found.deviation
+    assert found.deviation < 0.08
+
+
+def test_a_picture_that_slides_as_no_turn_moves_it_shows_none():
+    """As of a crop that follows somebody through the picture of a camera that stands still."""
+    still = seen(STILL, places=AROUND)
+    slid = CornerTracks(
+        still.rows,
+        still.numbers,
+        (still.points_px + 20.0 * still.rows[:, None] * [1.0, 0.0]).astype(np.float32),
+    )
+    assert focal_by_turns(slid, TIMES, assumed(1.0), WIDTH) is None
+
+
+@pytest.mark.parametrize(
+    ("rad_s", "speed"),
+    [(0.004, [0.0, 0.0, 0.0]), (0.25, [0.0, 0.0, 1.2]), (0.25, [0.8, 0.0, 0.0])],
+    ids=["small turns", "walks ahead", "walks sideways"],
+)
+def test_a_camera_that_travels_or_hardly_turns_shows_none(rad_s, speed):
+    R = exp(TIMES[:, None] * [0.0, rad_s, 0.0])
+    tracks = seen(R, TIMES[:, None] * speed, places=AROUND)
+    assert focal_by_turns(tracks, TIMES, assumed(1.5), WIDTH) is None
+
+
+def test_a_lens_that_zooms_while_it_turns_shows_none():
+    zooming = FOCAL_PX * np.linspace(1.0, 1.5, T)
+    tracks = seen(turning(0.25), focal_px=zooming, places=AROUND)
+    assert focal_by_turns(tracks, TIMES, assumed(1.5), WIDTH) is None
