@@ -29,6 +29,11 @@ EDGE_PX = 6  # width of a black bar's edge
 # Any other bar ends in a step along one line of pixels, and has little detail.
 MIN_STEP = 8  # of 255
 MIN_STEP_SHARE = 0.7  # of the line
+# One edge of a pair may be fainter, as where a blurred floor goes on beside the floor: a step of
+# half the line, which few pixels of the lines beside it have.
+FAINT_STEP = 3  # of 255
+FAINT_STEP_SHARE = 0.5
+FAINT_SHARE_BESIDE = 0.25  # of the share of the line
 MAX_DETAIL = 0.2  # of the picture's, on average
 
 
@@ -98,11 +103,17 @@ def _black_bars(bright: FloatArray) -> tuple[int, int] | None:
 def _other_bars(grey: NDArray[Any]) -> tuple[int, int] | None:
     """Return the widths of bars of any kind on the left and right of a picture (rows, n)."""
     n = grey.shape[1]
-    steps = (cv2.absdiff(grey[:, 1:], grey[:, :-1]) > MIN_STEP).mean(axis=0)
-    edges = np.flatnonzero(steps >= MIN_STEP_SHARE) + 1
+    differences = cv2.absdiff(grey[:, 1:], grey[:, :-1])
+    is_clear = (differences > MIN_STEP).mean(axis=0) >= MIN_STEP_SHARE
+    faint = np.pad((differences > FAINT_STEP).mean(axis=0), 1)
+    beside = np.maximum(faint[:-2], faint[2:])
+    faint = faint[1:-1]
+    is_faint = (faint >= FAINT_STEP_SHARE) & (beside <= FAINT_SHARE_BESIDE * faint)
+    edges = np.flatnonzero(is_clear | is_faint) + 1
     begins = edges[edges < n / 2]
     ends = n - edges[edges > n / 2]
     is_pair = np.abs(begins[:, None] - ends) <= _tolerance(n)
+    is_pair &= is_clear[begins - 1][:, None] | is_clear[n - ends - 1]
     pairs = [(int(begins[i]), int(ends[j])) for i, j in np.argwhere(is_pair)]
     pairs = [pair for pair in pairs if min(pair) >= max(MIN_WIDTH * n, 4) and n - sum(pair) > 4]
     if not pairs:

@@ -67,6 +67,28 @@ def test_bars_of_other_kinds_are_found(kind: str, upright: bool) -> None:
     assert content_size(bars, *picture.shape[1::-1]) == pytest.approx(content, abs=4)
 
 
+def above_a_floor(step: float) -> np.ndarray:
+    """A clip of somebody on a plain floor, in front of its own blurred copy, whose floor is darker
+    by ``step`` of 255 where the clip ends.
+    """
+    clip = cv2.resize(scene(54, 30), (540, 300), interpolation=cv2.INTER_CUBIC)
+    clip[250:] = np.linspace(150.0, 160.0, 540).astype(np.uint8)[None, :, None]
+    picture = np.full((960, 540, 3), 60, np.uint8)
+    picture[330:630] = clip
+    picture[630:] = np.linspace(150.0 - step, 160.0 - step, 540).astype(np.uint8)[None, :, None]
+    return picture
+
+
+def test_a_bar_whose_floor_goes_on_from_the_picture_s_is_found() -> None:
+    """By a step too faint to tell alone, opposite a clear one."""
+    picture = above_a_floor(5.0)
+    bars = find_bars(picture)
+    assert content_size(bars, *picture.shape[1::-1]) == pytest.approx((540, 300), abs=4)
+    assert find_bars(above_a_floor(0.0)) == []
+    picture[:340] = picture[340]  # nor does a faint step tell anything alone
+    assert find_bars(picture) == []
+
+
 @pytest.mark.parametrize(
     "picture",
     [
