@@ -23,7 +23,7 @@ from itertools import groupby
 import numpy as np
 
 from ....solver.rotations import log
-from ...arrays import Float64Array, IndexArray
+from ...arrays import BoolArray, Float64Array, IndexArray
 from ...kinematics.smoothing import interpolated_rotations
 from .corner_tracks import SAMPLES_HZ, SLOW_S, CornerTracks
 from .intrinsics import Camera
@@ -46,6 +46,7 @@ MIN_TURN_CORNERS = 30  # that its two sightings share
 MAX_TURN_ZOOM = 0.01  # logarithm, of links that turn alone
 MAX_SPREAD = 0.08  # of the logarithms of the focal length in the links
 SYSTEMATIC = 0.04  # relative error of a focal length however well the links agree
+MIN_LINKED = 0.9  # of the sightings, with the one before
 LIMITS = (0.45, 2.3)  # of the true focal length over the assumed one
 
 
@@ -141,6 +142,7 @@ class TurnedLens:
 
     ratio: float  # of the focal length to the assumed one
     deviation: float  # its relative error, one standard deviation
+    known: BoolArray  # (T,) False where too few corners are seen in two successive sightings
     R_first_camera: Float64Array  # (T, 3, 3) as far as the assumed focal length is right
 
 
@@ -156,8 +158,11 @@ def focal_by_turns(
     """
     sightings = Sightings.of(corners, camera, longer_side_px)
     links = _links(sightings)
-    is_whole = sum(len(link.turns) for link in links) == len(sightings.rows) - 1
-    if not is_whole or any(link.is_travel for link in links):
+    is_linked = np.zeros(len(sightings.rows), bool)  # to the sighting before
+    is_linked[:1] = True
+    for link in links:
+        is_linked[link.first + 1 : link.first + 1 + len(link.turns)] = True
+    if not is_linked.size or is_linked.mean() < MIN_LINKED or any(x.is_travel for x in links):
         return None
     logs = []
     for link in links:
@@ -178,7 +183,10 @@ def focal_by_turns(
     if spread > MAX_SPREAD or not LIMITS[0] < ratio < LIMITS[1]:
         return None
     deviation = float(np.hypot(SYSTEMATIC, 1.25 * spread / np.sqrt(len(logs))))
-    return TurnedLens(ratio, deviation, _rotations(links, times[sightings.rows], times))
+    known = np.ones(len(times), bool)
+    for k in np.flatnonzero(~is_linked):
+        known[sightings.rows[k - 1] + 1 : sightings.rows[k] + 1] = False
+    return TurnedLens(ratio, deviation, known, _rotations(links, times[sightings.rows], times))
 
 
 def _without_gaps(steps: Float64Array, seconds: Float64Array) -> Float64Array:

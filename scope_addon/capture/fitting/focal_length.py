@@ -166,8 +166,7 @@ class BackgroundEstimators:
         """Return the background and the camera whose focal length its own turns tell, if they tell
         more than what was known: those given otherwise.
 
-        With a wrong focal length, the rotations of corners do not agree, and may have been lost;
-        with the turns, they are known throughout.
+        With a wrong focal length, the rotations of corners do not agree, and may have been lost.
         """
         found = None
         if camera.focal_deviation > 0.0:
@@ -178,8 +177,12 @@ class BackgroundEstimators:
             return record, camera
         focal_px = found.ratio * float(self._given_camera.intrinsics[0, 0])
         content = content_size(record.bars, *self._size)
-        known = np.ones(len(record.times), bool)
-        turned = replace(record, R_first_camera=found.R_first_camera, known=known, inlier_shares=[])
+        turned = replace(
+            record,
+            R_first_camera=found.R_first_camera,
+            known=found.known,
+            inlier_shares=[],  # The wrong focal length has lowered them.
+        )
         return turned, estimated_camera(*self._size, focal_px, found.deviation, content)
 
     def wait_for_solver(self, progress: Callable[[int], None]) -> None:

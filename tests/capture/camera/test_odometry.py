@@ -228,6 +228,20 @@ def test_a_camera_that_turns_shows_its_focal_length(ratio):
     assert found.deviation < 0.08
 
 
+def test_where_all_corners_are_lost_the_rotation_of_a_turning_camera_is_unknown():
+    tracks = seen(turning(0.25), places=AROUND)
+    others = CornerTracks(
+        tracks.rows, tracks.numbers + len(AROUND) * (tracks.rows >= 30), tracks.points_px
+    )
+    found = focal_by_turns(others, TIMES, assumed(1.0), WIDTH)
+    assert np.flatnonzero(~found.known).tolist() == [30]
+    R = turning(0.25)
+    for rows in (slice(0, 30), slice(30, T)):
+        kept = found.R_first_camera[rows]
+        since = np.swapaxes(kept[:1], 1, 2) @ kept
+        assert largest_turn_deg(since, np.swapaxes(R[rows][:1], 1, 2) @ R[rows]) < 2.0
+
+
 def test_a_picture_that_slides_as_no_turn_moves_it_shows_none():
     """As of a crop that follows somebody through the picture of a camera that stands still."""
     still = seen(STILL, places=AROUND)
