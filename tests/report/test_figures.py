@@ -126,7 +126,7 @@ def test_each_frame_to_review_counts_once_whatever_the_reasons(body):
         residual_px=np.where(np.arange(T) < 20, 100.0, 0.0),
     )
     reasons = {span.reason for span in find_review_spans(motion)}
-    assert reasons == {"far", "floating"}
+    assert reasons == {"far", "floating", "leap"}  # down, from one frame to the next
     assert motion_figures(motion, body)["Frames to review"] == "91"
 
 
