@@ -15,7 +15,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ...solver.body import Body
 from ...solver.names import BODY_JOINTS
-from ..arrays import Float64Array
+from ..arrays import BoolArray, Float64Array
 from ..capture_report import Report
 from ..kinematics.foot_skin import UNDER_FLOOR_M, foot_heights, lower_floors, steps, upper_floors
 from ..kinematics.sequences import runs
@@ -24,6 +24,7 @@ from ..notices import Notice, Value, notice
 from ..options import option
 from ..options.capture import ON
 from ..review_spans import has_bent_knees, implausible
+from .camera.corner_tracks import STEP_S
 from .media.video import Video
 from .media.video_range import VideoRange
 from .observe import Footage
@@ -38,7 +39,6 @@ GIVEN_FLOOR_M = 0.03  # of the floor above or below z = 0 in the world of a give
 # background or none, the path of a travelling camera is unsure, and so is how far one turns.
 UNSURE_LENS = 0.15
 UNSURE_TURN_DEG = 20.0  # from which on that is seen
-LOST_STEPS = 1.5  # between frames of known rotation, of the median one: one is lost
 # Frames that repeat the one before change by less than this share of the largest changes that are
 # so near before and after them. Of 32 clips without such frames, at most 4 % of the frames do; of
 # five that were converted from lower rates, 18 % and more.
@@ -205,13 +205,25 @@ def turn_warnings(name: str, footage: Footage) -> list[Notice]:
     turn_deg = motion.largest_turn_deg
     if footage.camera.focal_deviation >= UNSURE_LENS and turn_deg >= UNSURE_TURN_DEG:
         warnings.append(notice("turn_by_lens", footage=name, degrees=turn_deg))
-    times = footage.timestamps[motion.known]
-    steps = np.diff(times)
-    is_cut = np.diff(np.searchsorted(footage.cuts_s, times)) > 0
-    begins = times[:-1][(steps > LOST_STEPS * np.median(steps)) & ~is_cut]
-    if len(begins):
-        warnings.append(notice("lost_turn", footage=name, times=begins.tolist()))
+    begins = lost_turns_s(motion.known, footage.timestamps, footage.cuts_s)
+    if begins:
+        warnings.append(notice("lost_turn", footage=name, times=begins))
     return warnings
+
+
+def lost_turns_s(known: BoolArray, times: Float64Array, cuts_s: Sequence[float]) -> list[float]:
+    """Return the times (n,) of the last frames before the camera's rotation is lost: where it is
+    still unknown when the next frame was followed.
+
+    :param known: (T,) whether the rotation of a frame is known; that of many is not needed.
+    :param times: (T,) seconds.
+    """
+    rows = np.flatnonzero(known)
+    last = np.append(rows[1:], len(times)) - 1  # before the next known one, or of the clip
+    cuts_until = np.searchsorted(cuts_s, times, "right")
+    is_lost = (times[last] - times[rows] >= STEP_S) & (cuts_until[last] == cuts_until[rows])
+    begins: list[float] = times[rows[is_lost]].tolist()
+    return begins
 
 
 def numbered(motions: list[Motion]) -> list[tuple[int, Motion]]:

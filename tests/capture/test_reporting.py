@@ -228,6 +228,17 @@ def test_when_the_rotation_of_a_turning_camera_is_lost_is_told(motion):
     assert "unknown at 1.9 s, because" in said["lost_turn"]
     assert not about_turns(motion, turning(0.0, lost=(60, 63)))
     assert not about_turns(motion, turning(10.0, lost=(60, 63)), cuts_s=[2.0])
+    until_the_end = about_turns(motion, turning(10.0, lost=range(240, T)))
+    assert "unknown at 7.9 s, because" in until_the_end["lost_turn"]
+
+
+def test_frames_that_the_footage_leaves_out_are_no_lost_rotation(motion):
+    """Of a rotation that is followed in every third frame, and of one that is known in all."""
+    followed = turning(10.0)
+    gap_s = np.where(np.arange(T) >= 63, 3 / RATE, 0.0)  # three are left out
+    later = replace(motion, timestamps=motion.timestamps + gap_s)
+    assert not about_turns(later, followed)
+    assert not about_turns(later, replace(followed, known=np.ones(T, bool)))
 
 
 @pytest.mark.parametrize(("is_certain", "codes"), [(True, []), (False, ["zoom"])])

@@ -31,7 +31,7 @@ from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray, Uint8Ar
 from ..perception.region import inside, surroundings
 from .background_record import REVEALING_S, BackgroundRecord, best_rotation, is_rotated
 from .bars import find_bars
-from .corner_tracks import SAMPLES_HZ, CornerFollower, background_mask, follow_corners
+from .corner_tracks import STEP_S, CornerFollower, background_mask, follow_corners
 from .heading_drift import EDGE_INTERVAL_S, EDGE_SIDE_PX, FrameEdges
 from .intrinsics import Camera
 from .line_segments import find_segments
@@ -110,7 +110,7 @@ class BackgroundTracker:
                 FrameEdges(row, find_segments(image_rgb, people, bars=self.bars))
             )
             self._hidden.reveal(people)
-        if time_s - self._last_used < 0.98 / SAMPLES_HZ and not (is_cut or is_sampled):
+        if time_s - self._last_used < STEP_S and not (is_cut or is_sampled):
             self._rotations.append(None)
             return
         self._last_used = time_s

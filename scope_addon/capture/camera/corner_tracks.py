@@ -20,6 +20,7 @@ from ..perception.region import inside
 from .intrinsics import Camera
 
 SAMPLES_HZ = 12.0  # hands tremble at up to 10 Hz, but by less than is visible here
+STEP_S = 0.98 / SAMPLES_HZ  # from which on the next frame is followed
 MAX_CORNERS = 220
 REPLENISHED_SHARE = 0.75  # of that number; with fewer, new corners are looked for
 SPACING_PX = 9  # between corners in the working image
