@@ -40,9 +40,12 @@ WORKING_SIDE_PX = 480  # the longer side of the image in which corners are follo
 HYPOTHESES = 128  # of two directions each
 MAX_CORNERS = 240
 MIN_CORNERS = 24  # with fewer left, the next key frame begins
+KEY_SHARE = 0.5  # of a key frame's corners, likewise
 MIN_INLIERS = 12  # corners that a rotation must explain
 QUALITIES = (0.01, 0.001)  # of a corner, relative to the best one; the second where few are found
-KEY_SHARE = 0.5  # of a key frame's corners, likewise
+# Of corners that agree, around their mean, over the longer side, where they are few or faint: those
+# of the shadow that somebody casts on a plain wall have 0.1, those all over the picture 0.3.
+MIN_SPREAD = 0.2
 INLIER_PX = 1.2  # in the working image
 MAX_RETURN_PX = 0.7  # between a corner and where it is found when it is followed back, likewise
 MIN_INLIER_SHARE = 0.35  # of corners; a crowd or water that fills the picture gives no rotation
@@ -72,6 +75,7 @@ class BackgroundTracker:
         self._points: Float32Array = np.zeros((0, 2), np.float32)  # in the working image
         self._key_rays: Float64Array = np.zeros((0, 3))
         self._key_count = 0
+        self._is_faint = False  # whether corners of the second quality are followed
         self._R_first_key = np.eye(3)
         self._R_key_last = np.eye(3)
         self._inlier_shares: list[float] = []
@@ -205,6 +209,9 @@ class BackgroundTracker:
         self._inlier_shares.append(float(agree.mean()))
         if agree.mean() < MIN_INLIER_SHARE or agree.sum() < MIN_INLIERS:
             return None
+        is_sparse = self._is_faint or len(self._points) < MIN_CORNERS
+        if is_sparse and spread(self._points[agree]) < MIN_SPREAD * WORKING_SIDE_PX:
+            return None
         return R
 
     def _shrink(self, image_rgb: Uint8Array) -> Uint8Array:
@@ -226,7 +233,8 @@ class BackgroundTracker:
         for quality in QUALITIES:
             corners = cv2.goodFeaturesToTrack(image, MAX_CORNERS, quality, 7, mask=mask)
             self._points = np.asarray([] if corners is None else corners, np.float32).reshape(-1, 2)
-            if len(self._points) >= 2 * MIN_CORNERS:
+            self._is_faint = quality < QUALITIES[0]
+            if len(self._points) >= MIN_CORNERS:
                 break
         self._key_rays = self._rays(self._points)
         self._key_count = len(self._points)
@@ -249,6 +257,11 @@ class BackgroundTracker:
     def _box(self, box_px: NDArray[Any]) -> Float64Array:
         """Return a box x0, y0, x1, y1 in the working image, with a margin."""
         return box_px * self._scale + [-4.0, -4.0, 4.0, 4.0]
+
+
+def spread(points: Float32Array) -> float:
+    """Return the root mean square distance of points (n, 2) from their mean."""
+    return float(np.sqrt(points.var(axis=0).sum()))
 
 
 def consensus_rotation(

@@ -126,6 +126,23 @@ def test_a_pan_over_a_plain_wall_is_found(bright, faint):
     assert angle_deg(found.R_first_camera, truth[0].T @ truth).max() < 0.4
 
 
+def test_a_shadow_that_moves_over_a_plain_wall_is_no_pan():
+    """Of somebody who walks by, on a wall with one spot."""
+    pictures = []
+    for k in range(60):
+        shadow = np.zeros((HEIGHT, WIDTH), np.float32)
+        x = 100 + 5 * k
+        cv2.circle(shadow, (x, 120), 22, 1.0, -1)
+        cv2.ellipse(shadow, (x, 200), (32, 60), 0.0, 0.0, 360.0, 1.0, -1)
+        for side in (-1, 1):
+            cv2.line(shadow, (x + 10 * side, 240), (x + 25 * side, 340), 1.0, 16)
+            cv2.line(shadow, (x + 20 * side, 160), (x + 50 * side, 240), 1.0, 12)
+        picture = 150.0 - 40.0 * cv2.GaussianBlur(shadow, (0, 0), 1.5)
+        picture[30:50, 600:620] = 60.0
+        pictures.append(np.repeat(picture[:, :, None], 3, axis=2).astype(np.uint8))
+    assert follow(pictures).is_static
+
+
 def test_a_pan_shows_a_lens_twice_as_long_as_assumed(panorama):
     """With the assumed lens, it would be 45 degrees; a lens that is given stays."""
     size = (WIDTH, HEIGHT)
