@@ -155,7 +155,11 @@ class CornerFollower:
         return CornerTracks(rows.astype(np.int64), numbers, to_full(points).astype(np.float32))
 
     def _has_moved(self, time_s: float) -> bool:
-        """Return whether the picture has moved since the corners were last kept, or lost many."""
+        """Return whether the picture has moved since the corners were last kept, or lost many, or
+        none were found then, as in a black frame.
+        """
+        if not len(self._kept_numbers):
+            return True
         common = np.isin(self._numbers, self._kept_numbers, assume_unique=True)
         if common.sum() < 0.5 * len(self._kept_numbers):
             return True

@@ -175,12 +175,16 @@ class BackgroundEstimators:
             )
         if found is None or found.deviation >= camera.focal_deviation:
             return record, camera
+        known = found.known.copy()
+        # Corners are not kept while they rest: whether they were lost, the record alone tells.
+        unseen = slice(int(record.corners.rows[-1]) + 1, None)
+        known[unseen] = record.known[unseen]
         focal_px = found.ratio * float(self._given_camera.intrinsics[0, 0])
         content = content_size(record.bars, *self._size)
         turned = replace(
             record,
             R_first_camera=found.R_first_camera,
-            known=found.known,
+            known=known,
             inlier_shares=[],  # The wrong focal length has lowered them.
         )
         return turned, estimated_camera(*self._size, focal_px, found.deviation, content)

@@ -152,12 +152,15 @@ def test_a_pan_shows_a_lens_twice_as_long_as_assumed(panorama):
     tracker = BackgroundTracker(assumed, *size)
     for k, R in enumerate(truth):
         tracker.add(view(panorama, R, long), k / FPS, [])
+    for k in range(50, 60):  # nothing is seen any more
+        tracker.add(np.full((HEIGHT, WIDTH, 3), 90, np.uint8), k / FPS, [])
     record = tracker.record()
     nothing = SimpleNamespace(load=lambda: None)
     with BackgroundEstimators(assumed, *size, nothing) as background:
         turned, camera = background.by_turns(record, assumed)
         assert background.by_turns(record, CAMERA) == (record, CAMERA)
     assert camera.intrinsics[0, 0] == pytest.approx(long[0, 0], rel=0.06)
+    assert not turned.known[50:].any()
     found = turned.motion(assumed, camera, size)
     assert found.largest_turn_deg == pytest.approx(np.degrees(0.4), rel=0.06)
 

@@ -3,10 +3,13 @@
 cameras see them.
 """
 
+import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.bundle_adjustment import Bundle, adjust, refine_pose
 from scope.scope_addon.capture.camera.corner_tracks import (
+    SAMPLES_HZ,
+    CornerFollower,
     CornerTracks,
     corners_at_rest,
     joined_corners,
@@ -201,6 +204,18 @@ def test_corners_are_not_at_rest_for_a_camera_that_travels():
     corners = seen(STILL, TIMES[:, None] * [0.0, 0.0, -0.5] + SHAKE)
     assert not len(corners_at_rest(corners, STILL, camera(), 0.004))
     assert not len(corners_at_rest(CornerTracks.none(), STILL, camera(), 0.004))
+
+
+@pytest.mark.parametrize("black", [0, 12])
+def test_corners_are_followed_again_after_a_black_frame(black):
+    rng = np.random.default_rng(0)
+    wall = cv2.resize(rng.integers(0, 255, (30, 70), np.uint8), (840, 360))
+    follower = CornerFollower()
+    for k in range(24):
+        picture = wall[:270, 12 * k : 12 * k + 480] * np.uint8(k != black)
+        follower.add(k, k / SAMPLES_HZ, picture, [], is_cut=False)
+    seen_in = np.unique(follower.tracks(lambda points: points).rows)
+    assert seen_in.tolist() == [k for k in range(24) if k != black]
 
 
 def around(n=700):
