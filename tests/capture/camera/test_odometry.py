@@ -239,8 +239,8 @@ def test_a_camera_that_turns_shows_its_focal_length(ratio):
     """With corners that are off by 0.3 pixels, and some that move on their own."""
     tracks = seen(turning(0.25), outliers=0.1, places=AROUND)
     found = focal_by_turns(tracks, TIMES, assumed(ratio), WIDTH)
-    assert abs(np.log(found.ratio / ratio)) < 2.0 * found.deviation
-    assert found.deviation < 0.08
+    assert abs(np.log(found.ratio / ratio)) < 0.08
+    assert found.deviation < 0.1
 
 
 def test_where_all_corners_are_lost_the_rotation_of_a_turning_camera_is_unknown():
