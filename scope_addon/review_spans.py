@@ -52,16 +52,14 @@ FLOATING_M = 0.25  # of both ankles' height above that at which they stand
 FLOATING_S = 1.2  # a jump of 1.7 m
 LEAP_M_S = 8.0  # in 40 captures without a leap, below 6
 LEAP_S = 0.3  # within which the body is less than half as fast before it, and after it
-# Of a leap. In a step, the mean of all keypoints moves by at most 0.07 m
-# more than in any step near it in 60 captures without a leap, and by 0.2 m and more in six with
-# one.
+# Of a leap. In a step, the mean of all keypoints moves by at most 0.07 m more than in any step near
+# it in 60 captures without a leap, and by 0.2 m and more in six with one.
 LEAP_M = 0.15
 POSE_LEAP_M_S = 3.0
 SPIN_RAD_S = 4 * np.pi  # in 60 captures without a spin, below 1.5 π
 SPIN_RAD = 0.5
-LEVEL_HIPS = (
-    0.6  # share of the distance between the hips that is level, from which it has a heading
-)
+# Share of the distance between the hips that is level, from which on the pelvis has a heading.
+LEVEL_HIPS = 0.6
 # By which a hand or foot speeds up, and slows down after it, in the time of `SNAP_S`: a boxer's
 # fist reaches 200 m/s². In that time, it is faster by 6.7 m/s than before and after it.
 SNAP_M_S2 = 200.0
