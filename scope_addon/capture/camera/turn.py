@@ -43,17 +43,22 @@ class Turn:
 
         With the right a and g, D(1 / (a g)) H D(a) has equal singular values.
         """
-        focal, zoom, R = 1.0, 1.0, np.eye(3)
+        focal = 1.0
+        zoom = 1.0
+        R = np.eye(3)
         for focal_step, zoom_step in ((1.1, 1.08), (1.03, 1.02), (1.008, 1.005)):
             factors = np.arange(-5, 6)
             focals, zooms = np.meshgrid(focal * focal_step**factors, zoom * zoom_step**factors)
-            a, g = focals.ravel(), zooms.ravel()
+            a = focals.ravel()
+            g = zooms.ravel()
             one = np.ones(len(a))
             left = np.stack([1.0 / (a * g), 1.0 / (a * g), one], axis=1)
             right = np.stack([a, a, one], axis=1)
             U, s, Vt = np.linalg.svd(left[:, :, None] * H * right[:, None])
             best = int(((s[:, 0] - s[:, 2]) / s[:, 1]).argmin())
-            focal, zoom, R = float(a[best]), float(g[best]), U[best] @ Vt[best]
+            focal = float(a[best])
+            zoom = float(g[best])
+            R = U[best] @ Vt[best]
         return cls(R * np.sign(np.linalg.det(R)), focal, zoom)
 
     def residuals(self, rays_a: Float64Array, rays_b: Float64Array) -> Float64Array:
